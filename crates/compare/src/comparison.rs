@@ -289,6 +289,10 @@ impl ComparisonBuilder {
             let of_settings = causes::of_settings(settings, &feature.feature);
             add("the configurations", differing.len(), of_settings);
         }
+        for feature in &mut self.features {
+            // What differs has more to say than what is only rounded.
+            feature.causes.sort_by_key(|found| found.cause.kind == causes::CauseKind::Rounding);
+        }
         let equal = |f: &FeatureReport| f.differing == 0;
         let mut texts = self.exact;
         texts.extend(texts::compare(

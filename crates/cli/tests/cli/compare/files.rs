@@ -5,48 +5,11 @@ use std::path::Path;
 use std::process::Output;
 
 use corsmal_files::npy::{DType, Header};
-use corsmal_files::npz::{Compression, NpzWriter};
+use corsmal_files::npz::{Compression, NpzFile, NpzWriter};
 use serde_json::{Value, json};
 
-use super::support::{Files, levels, npz, powers, text};
+use super::support::{Files, extract, levels, npz, powers, recording, text};
 use crate::command::run;
-
-/// Two channels of noise and a chirp, a second at 16 kHz; the second channel is 30 dB lower.
-fn recording(path: &Path, seed: u64) {
-    let spec = hound::WavSpec {
-        channels: 2,
-        sample_rate: 16_000,
-        bits_per_sample: 16,
-        sample_format: hound::SampleFormat::Int,
-    };
-    let mut writer = hound::WavWriter::create(path, spec).unwrap();
-    let mut state = seed;
-    for t in 0..16_000 {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(99);
-        let noise = (state >> 40) as f64 / (1u64 << 24) as f64 - 0.5;
-        let s = t as f64 / 16_000.0;
-        let chirp = (std::f64::consts::TAU * (200.0 + 1500.0 * s) * s).sin();
-        let sample = 8000.0 * chirp + 600.0 * noise;
-        writer.write_sample(sample as i16).unwrap();
-        writer.write_sample((sample / 32.0) as i16).unwrap();
-    }
-    writer.finalize().unwrap();
-}
-
-/// Features of two recordings, with these arguments.
-fn extract(files: &Files, out: &str, more: &[&str]) {
-    let audio = files.path("audio");
-    if !audio.is_dir() {
-        std::fs::create_dir(&audio).unwrap();
-        recording(&audio.join("one.wav"), 1);
-        recording(&audio.join("two.wav"), 2);
-    }
-    let out = files.path(out);
-    let mut args = vec!["extract", "--in", audio.to_str().unwrap(), "--out", out.to_str().unwrap()];
-    args.extend(more);
-    let ended = run(&args);
-    assert!(ended.status.success(), "{}", text(&ended.stderr));
-}
 
 fn kinds(report: &Value, feature: &str) -> Vec<String> {
     let features = report["features"].as_array().unwrap();
@@ -150,6 +113,26 @@ fn arrays_by_map_by_name_and_alone() {
     assert_eq!(report["within"], true, "{report:#}");
     assert_eq!(report["features"][0]["dtypes"], json!(["<f4", "<f8"]));
     assert_eq!(report["features"][0]["equal"], 7200);
+}
+
+/// Rounding in another recording was the first cause that was named.
+#[test]
+fn what_differs_is_explained_before_what_is_rounded() {
+    let files = Files::new();
+    extract(&files, "a.npz", &["--preset", "logmel"]);
+    let mut read = NpzFile::open(&files.path("a.npz")).unwrap();
+    let mut writer = NpzWriter::create(&files.path("b.npz"), Compression::Stored).unwrap();
+    for (name, change) in [("one", 1e-5), ("two", 3.0)] {
+        let values = read.f32(name).unwrap();
+        let shape = values.shape().to_vec();
+        let values: Vec<f32> = values.iter().map(|v| v + change).collect();
+        writer.floats(name, &shape, &values).unwrap();
+    }
+    writer.finish().unwrap();
+    let report = files.json("a.npz", "b.npz", &[]);
+    let causes = report["features"][0]["causes"].as_array().unwrap();
+    let kinds: Vec<&Value> = causes.iter().map(|cause| &cause["kind"]).collect();
+    assert_eq!(kinds, ["offset", "rounding"], "{report:#}");
 }
 
 #[test]

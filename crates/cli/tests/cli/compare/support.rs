@@ -64,3 +64,40 @@ impl Files {
         serde_json::from_slice(&out.stdout).unwrap()
     }
 }
+
+/// Two channels of noise and a chirp, a second at 16 kHz; the second channel is 30 dB lower.
+pub fn recording(path: &Path, seed: u64) {
+    let spec = hound::WavSpec {
+        channels: 2,
+        sample_rate: 16_000,
+        bits_per_sample: 16,
+        sample_format: hound::SampleFormat::Int,
+    };
+    let mut writer = hound::WavWriter::create(path, spec).unwrap();
+    let mut state = seed;
+    for t in 0..16_000 {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(99);
+        let noise = (state >> 40) as f64 / (1u64 << 24) as f64 - 0.5;
+        let s = t as f64 / 16_000.0;
+        let chirp = (std::f64::consts::TAU * (200.0 + 1500.0 * s) * s).sin();
+        let sample = 8000.0 * chirp + 600.0 * noise;
+        writer.write_sample(sample as i16).unwrap();
+        writer.write_sample((sample / 32.0) as i16).unwrap();
+    }
+    writer.finalize().unwrap();
+}
+
+/// Features of two recordings, with these arguments.
+pub fn extract(files: &Files, out: &str, more: &[&str]) {
+    let audio = files.path("audio");
+    if !audio.is_dir() {
+        std::fs::create_dir(&audio).unwrap();
+        recording(&audio.join("one.wav"), 1);
+        recording(&audio.join("two.wav"), 2);
+    }
+    let out = files.path(out);
+    let mut args = vec!["extract", "--in", audio.to_str().unwrap(), "--out", out.to_str().unwrap()];
+    args.extend(more);
+    let ended = run(&args);
+    assert!(ended.status.success(), "{}", text(&ended.stderr));
+}
