@@ -106,7 +106,10 @@ class FeatureExtractor(TransformerMixin, BaseEstimator):
 
     @refuses
     def fit(self, X: Any, y: Any = None) -> Self:
-        """Learns the names of the columns, including channels, from the first recording of `X`."""
+        """Learns the names of the columns, including channels, from the first recording of `X`.
+
+        With `errors="nan"`, from the first that can be read.
+        """
         recordings = _recordings(X)
         for position, recording in enumerate(recordings):
             if not _is_path(recording):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Hashable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
@@ -137,7 +137,10 @@ class Features:
         return iter(self.ids)
 
     def __contains__(self, recording: object) -> bool:
-        return isinstance(recording, Hashable) and recording in self._rows
+        try:
+            return recording in self._rows
+        except TypeError:  # lists, slices
+            return False
 
     @cached_property
     def _rows(self) -> dict[object, int]:

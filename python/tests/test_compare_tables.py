@@ -15,16 +15,22 @@ pandas = pytest.importorskip("pandas")
 pytest.importorskip("pyarrow")
 
 
-def compared(folder: Path, a: dict[str, Any], b: dict[str, Any], *options: str) -> dict[str, Any]:
+def compare(
+    folder: Path, a: dict[str, Any], b: dict[str, Any], *options: str
+) -> subprocess.CompletedProcess[bytes]:
     command = os.environ.get("CORSMAL_FEAT")
     if not command:
         pytest.skip("CORSMAL_FEAT is not set: the path of the command")
     for name, columns in (("a.parquet", a), ("b.parquet", b)):
         pandas.DataFrame({"id": ["p", "q"], **columns}).to_parquet(folder / name)
     paths = [folder / "a.parquet", folder / "b.parquet"]
-    ran = subprocess.run(
+    return subprocess.run(
         [command, "compare", *paths, *options, "--json"], capture_output=True, check=False
     )
+
+
+def compared(folder: Path, a: dict[str, Any], b: dict[str, Any], *options: str) -> dict[str, Any]:
+    ran = compare(folder, a, b, *options)
     assert ran.returncode in (0, 1), ran.stderr
     report: dict[str, Any] = json.loads(ran.stdout)
     assert report["within"] == (ran.returncode == 0)
@@ -42,6 +48,13 @@ def test_a_large_column_does_not_hide_a_small_one(tmp_path: Path) -> None:
     # Roundings of each column are none.
     near = {name: np.array(values) * (1 + 1e-7) for name, values in a.items()}
     assert compared(tmp_path, a, near)["within"]
+
+
+def test_the_difference_that_is_told_is_one(tmp_path: Path) -> None:
+    a = {"spectral_centroid.mean": [2000.0, 2100.0], "rms.mean": [0.010, 0.012]}
+    b = {"spectral_centroid.mean": [2000.0, 2100.01], "rms.mean": [0.010, 0.017]}
+    largest = compared(tmp_path, a, b)["features"][0]["largest"]
+    assert (largest["array"], largest["position"]) == ("q", "rms.mean")
 
 
 def test_coefficients_of_a_vector_have_one_scale(tmp_path: Path) -> None:
@@ -71,3 +84,13 @@ def test_large_whole_numbers_are_compared_exactly(
     report = compared(tmp_path, large, {**large, "k": [7, 5]})
     assert [text["differing"] for text in report["texts"] if text["name"] == "k"] == [1]
     assert report["only_a"] == report["only_b"] == []
+    # As pandas has whole numbers with a gap.
+    report = compared(tmp_path, large, {**large, "k": [7.0, np.nan]})
+    assert [text["differing"] for text in report["texts"] if text["name"] == "k"] == [2]
+    assert report["only_a"] == report["only_b"] == []
+
+
+def test_tables_of_texts_without_a_common_row_have_nothing_in_common(tmp_path: Path) -> None:
+    for a, b in (({"s": ["a", "b"]}, {"s": ["x", "y"]}), ({"k": [1, 2]}, {"k": [2**60, 2**61]})):
+        ran = compare(tmp_path, a, {"id": ["u", "v"], **b})
+        assert ran.returncode == 2 and b"no recording in common" in ran.stderr, ran

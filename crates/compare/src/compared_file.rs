@@ -248,15 +248,18 @@ impl ComparedFile {
         &self.texts
     }
 
-    /// Makes columns of whole numbers texts where they are texts in the other file, as numbers that
-    /// doubles would round.
+    /// Makes columns of whole numbers texts where those of the other file are texts, as doubles would
+    /// round them.
     pub(super) fn spell_out(&mut self, other: &Self) {
         let Some(table) = &mut self.table else { return };
-        let is_text = |name: &String, kind: &str| {
-            kind.contains("int") && other.texts.iter().any(|t| t.name == *name)
+        let is_whole = |text: &String| text.is_empty() || text.parse::<i128>().is_ok();
+        let is_text = |at: usize| {
+            let mut theirs = other.texts.iter().filter(|text| text.name == table.names[at]);
+            theirs.any(|text| text.values.iter().all(is_whole))
+                && table.values.column(at).iter().all(|x| x.is_nan() || x.fract() == 0.0)
         };
         let (texts, kept): (Vec<usize>, Vec<usize>) =
-            (0..table.names.len()).partition(|&i| is_text(&table.names[i], table.types[i]));
+            (0..table.names.len()).partition(|&i| is_text(i));
         for &at in &texts {
             let spelled = |x: &f64| if x.is_nan() { String::new() } else { format!("{x:.0}") };
             let values: Vec<String> = table.values.column(at).iter().map(spelled).collect();

@@ -54,7 +54,7 @@ fn same(a: f64, b: f64) -> bool {
     a == b || (a.is_nan() && b.is_nan())
 }
 
-/// The largest difference and where it is.
+/// The largest difference beyond the tolerance, or else of all, and where it is.
 #[derive(Debug, Clone, Serialize)]
 pub struct Extreme {
     /// `|a - b|`.
@@ -69,6 +69,8 @@ pub struct Extreme {
     pub position: String,
     /// Where in it, along each axis.
     pub index: Vec<usize>,
+    #[serde(skip)]
+    is_beyond: bool,
 }
 
 /// Statistics of the differences between values that stand in the same places.
@@ -82,7 +84,7 @@ pub struct Difference {
     pub within: u64,
     /// Values that are finite in one file only.
     pub one_sided: u64,
-    /// The largest difference of finite values.
+    /// The largest difference of finite values, beyond the tolerance where there is one.
     pub largest: Option<Extreme>,
     /// Largest `|a - b| / max(|a|, |b|)`.
     pub max_relative: f64,
@@ -113,13 +115,14 @@ impl Difference {
         limit: impl Fn(usize) -> Limit,
         locate: impl FnOnce(usize) -> (String, String, Vec<usize>),
     ) {
-        let mut largest = self.largest.as_ref().map_or(0.0, |extreme| extreme.value);
+        let mut largest = self.largest.as_ref().map_or((false, 0.0), |e| (e.is_beyond, e.value));
         let mut worst = None;
         let mut moments = Moments::default();
         for (ordinal, (a, b)) in values.enumerate() {
             self.values += 1;
             self.equal += u64::from(same(a, b));
-            self.within += u64::from(limit(ordinal).holds(a, b));
+            let is_within = limit(ordinal).holds(a, b);
+            self.within += u64::from(is_within);
             if !(a.is_finite() && b.is_finite()) {
                 self.one_sided += u64::from(!same(a, b));
                 continue;
@@ -129,14 +132,15 @@ impl Difference {
             if value > 0.0 {
                 self.max_relative = self.max_relative.max(value / a.abs().max(b.abs()));
             }
-            if value > largest {
-                largest = value;
+            if (!is_within, value) > largest {
+                largest = (!is_within, value);
                 worst = Some((ordinal, a, b));
             }
         }
         if let Some((ordinal, a, b)) = worst {
             let (array, position, index) = locate(ordinal);
-            self.largest = Some(Extreme { value: largest, a, b, array, position, index });
+            let (is_beyond, value) = largest;
+            self.largest = Some(Extreme { value, a, b, array, position, index, is_beyond });
         }
         self.moments.join(moments);
         self.rms = (self.moments.differences / self.moments.count.max(1.0)).sqrt();

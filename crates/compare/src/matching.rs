@@ -102,14 +102,14 @@ impl Matching {
                 matching.paired_by = by;
             }
         }
-        matching.tables(a, b)?;
+        let has_rows = matching.tables(a, b)?;
         if let (true, [only_a], [only_b]) =
             (pairs.is_empty() && matching.tables.is_empty(), &rest_a[..], &rest_b[..])
         {
             pairs.push((*only_a, *only_b));
             (rest_a, rest_b) = (Vec::new(), Vec::new());
         }
-        if pairs.is_empty() && matching.tables.is_empty() && !a.shares_texts_only(b) {
+        if pairs.is_empty() && matching.tables.is_empty() && !(has_rows && a.shares_texts_only(b)) {
             if let (Some(in_a), Some(in_b)) = (a.rows_or_recordings(), b.rows_or_recordings()) {
                 let (of_a, of_b) = (a.path().into(), b.path().into());
                 if in_a.iter().any(|id| in_b.contains(id)) {
@@ -140,7 +140,8 @@ impl Matching {
         Ok(matching)
     }
 
-    fn tables(&mut self, a: &ComparedFile, b: &ComparedFile) -> Result<(), CompareError> {
+    /// Pairs the columns of two tables; whether they have a row in common.
+    fn tables(&mut self, a: &ComparedFile, b: &ComparedFile) -> Result<bool, CompareError> {
         let (x, y) = match (a.table(), b.table()) {
             (Some(x), Some(y)) => (x, y),
             (x, y) => {
@@ -149,7 +150,7 @@ impl Matching {
                 };
                 self.only_a.extend(names(x));
                 self.only_b.extend(names(y));
-                return Ok(());
+                return Ok(false);
             }
         };
         let in_a = (&*x.names, &*by_name(&x.names));
@@ -168,7 +169,7 @@ impl Matching {
             }
         };
         if rows.is_empty() {
-            return Ok(());
+            return Ok(false);
         }
         let ours = a.provenance().is_some() || b.provenance().is_some();
         let mut features: Vec<String> = Vec::new();
@@ -190,7 +191,7 @@ impl Matching {
             let vectors = columns.iter().map(|(i, _)| vector(&x.names[*i])).collect();
             self.tables.push(TableMatch { feature, columns, vectors, rows: rows.clone() });
         }
-        Ok(())
+        Ok(true)
     }
 }
 
@@ -333,8 +334,10 @@ fn vector_of(column: &str) -> String {
 }
 
 fn without_channel(column: &str) -> &str {
+    let is_channel =
+        |place: &str| place.strip_prefix("ch").is_some_and(|n| n.parse::<u8>().is_ok());
     match column.split_once('/') {
-        Some((place, rest)) if place.starts_with("ch") => rest,
+        Some((place, rest)) if is_channel(place) => rest,
         _ => column,
     }
 }

@@ -1,6 +1,6 @@
 //! Recordings cut into windows or stretches, each an input of its own.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::ops::RangeInclusive;
 use std::path::absolute;
 use std::sync::Arc;
@@ -30,18 +30,15 @@ pub struct WindowSpan {
 
 /// The same with a label `recording`, the path, where inputs are stretches of one file: folds keep them
 /// together also where another program rewrites the table. A label of that name stays as it is.
-///
-/// # Errors
-/// Stretches of web addresses that only their queries tell apart, which no output has.
-pub fn name_recordings(mut inputs: Vec<Input>) -> Result<Vec<Input>, InputError> {
+pub fn name_recordings(mut inputs: Vec<Input>) -> Vec<Input> {
     let is_stretch = |input: &Input| input.start.is_some() || input.end.is_some();
     let is_named = |input: &Input| input.labels.iter().any(|(name, _)| name == RECORDING);
     if !inputs.iter().any(is_stretch) || inputs.iter().any(is_named) {
-        return Ok(inputs);
+        return inputs;
     }
     // A file may be written in several ways; the first one names it.
-    let mut names: HashMap<String, String> = HashMap::new();
-    let mut recordings = Vec::with_capacity(inputs.len());
+    let mut names: HashMap<String, (String, String)> = HashMap::new();
+    let mut places = Vec::with_capacity(inputs.len());
     for input in &inputs {
         let name = spelling::plain(&input.source.to_string());
         let place = match &input.source {
@@ -52,23 +49,22 @@ pub fn name_recordings(mut inputs: Vec<Input>) -> Result<Vec<Input>, InputError>
             _ => None,
         };
         let place = place.unwrap_or_else(|| name.clone());
-        recordings.push(names.entry(place).or_insert(name).clone());
+        names.entry(place.clone()).or_insert_with(|| (name, input.id.clone()));
+        places.push(place);
     }
-    let mut seen = HashSet::new();
-    if let Some(name) = names.values().find(|name| !seen.insert(name.as_str())) {
-        return Err(InputError::Store {
-            name: name.clone(),
-            reason: format!(
-                "several recordings share this address and differ only in the query: add a column {RECORDING} to the \
-                 manifest, with a name for each recording"
-            ),
-        });
-    }
+    // Addresses that only their queries tell apart, which no output has, go by the first of their ids.
+    let mut times: HashMap<&str, usize> = HashMap::new();
+    names.values().for_each(|(name, _)| *times.entry(name).or_default() += 1);
+    let named = |(name, id): &(String, String)| match times[name.as_str()] {
+        1 => name.clone(),
+        _ => id.clone(),
+    };
+    let recordings: Vec<String> = places.iter().map(|place| named(&names[place])).collect();
     if names.len() < inputs.len() {
         let named = inputs.iter_mut().zip(recordings);
         named.for_each(|(input, recording)| input.labels.push((RECORDING.into(), recording)));
     }
-    Ok(inputs)
+    inputs
 }
 
 /// The windows of every recording, in the order of time: `x@0.5` begins half a second into `x`.
@@ -82,8 +78,7 @@ pub fn name_recordings(mut inputs: Vec<Input>) -> Result<Vec<Input>, InputError>
 ///
 /// # Errors
 /// Standard input, which cannot be read twice; too many windows; a window with the id of another
-/// input; a label called `recording`, by whose values folds would split recordings; stretches of web
-/// addresses that only their queries tell apart; a stop.
+/// input; a label called `recording`, by whose values folds would split recordings; a stop.
 pub fn into_windows(
     inputs: Vec<Input>,
     span: WindowSpan,
@@ -96,7 +91,7 @@ pub fn into_windows(
         );
         return Err(InputError::Window { id: input.id.clone(), reason });
     }
-    let inputs = name_recordings(inputs)?;
+    let inputs = name_recordings(inputs);
     let headers = headers(&inputs, stop);
     let lengths = lengths(&inputs, &headers, stop);
     if stop.load(Ordering::Relaxed) {

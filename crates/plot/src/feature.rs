@@ -111,7 +111,11 @@ impl FeaturePanel {
         };
         // A gap where a value is not finite.
         for run in values.iter().enumerate().collect::<Vec<_>>().split(|(_, v)| !v.is_finite()) {
-            let points: Vec<_> = run.iter().map(|(i, v)| place((*i, v))).collect();
+            let mut points: Vec<_> = run.iter().map(|(i, v)| place((*i, v))).collect();
+            if let [(x, y)] = points[..] {
+                // A single frame is as long as it lasts.
+                points = vec![(x - step / 2.0, y), (x + step / 2.0, y)];
+            }
             on.line(&points, Paint::Series(2), 1.3, false);
         }
     }

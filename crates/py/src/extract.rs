@@ -138,7 +138,7 @@ pub(crate) fn extract(
             told.warning(&skipped);
         }
         let inputs = match span {
-            None => name_recordings(found.inputs).map_err(input_error)?,
+            None => name_recordings(found.inputs),
             Some(span) => into_windows(found.inputs, span, stop).map_err(input_error)?,
         };
         run::run(&inputs, &config, &options, &told, stop).map_err(|error| match error {

@@ -25,6 +25,8 @@ pub(crate) use sync::{WINDOW, find, find_free};
 
 const EXPECTED: &str = "MPEG audio of layers 1 to 3";
 
+/// Bytes of the shortest frame: 8 kbit/s of layer 3 at 24 kHz.
+const SHORTEST: u64 = 24;
 /// Bytes of a tag of ID3 version 1, at the end of a file.
 const ID3V1: u64 = 128;
 /// So many frames of free format may be damaged before their rate is held to be too high.
@@ -263,6 +265,9 @@ impl Stream for MpegStream {
     fn ends_as_declared(&mut self) -> Result<bool, AudioError> {
         let said = self.part.tag.and_then(|tag| tag.bytes).map(u64::from);
         let Some((bytes, len)) = said.zip(self.frames.input.len()) else { return Ok(false) };
+        if self.part.declared().is_some_and(|frames| frames > bytes / SHORTEST) {
+            return Ok(false);
+        }
         // Counted with the frame of the tag or without it, before an ID3 tag or without one.
         let end = self.begin + bytes;
         let ends = [end, end + self.tagged];

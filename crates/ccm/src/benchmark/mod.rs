@@ -117,7 +117,8 @@ pub struct Finished {
 /// # Errors
 /// [`crate::CcmError`] when the data set has no labelled training recordings, when a file to add is
 /// unusable or covers a part of the data set only partly, when annotation files contradict each other,
-/// when a recording cannot be read, when something cannot be written, and when stopped.
+/// when a recording of a baseline cannot be read, when no system can be trained and nothing else is
+/// asked for, when something cannot be written, and when stopped.
 pub fn run(
     options: &BenchmarkOptions,
     progress: &(dyn Fn(&str) + Sync),
@@ -172,14 +173,16 @@ pub fn run(
                     }
                 }
                 Err(CcmError::Request(reason)) => {
-                    progress(&format!("warning: {reason}; it is left out"));
-                    failed.push(reason);
+                    let name = system.name();
+                    progress(&format!("warning: {name} is left out: {reason}"));
+                    failed.push(format!("{name}: {reason}"));
                 }
                 Err(error) => return Err(error),
             }
         }
     }
-    if let (Some(first), true) = (failed.first(), outcomes.is_empty() && runs.is_empty()) {
+    let is_empty = outcomes.is_empty() && runs.is_empty() && added.is_empty();
+    if let (Some(first), true) = (failed.first(), is_empty && capacities.is_empty()) {
         return Err(CcmError::Request(first.clone()));
     }
     cautions.extend(failed.iter().map(|reason| format!("Left out: {reason}.")));

@@ -160,7 +160,7 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
     let stop = crate::interrupt::flag();
     let mut found = recordings::named(&names, |warning| meter.warning(warning))?;
     found = match args.window {
-        None => name_recordings(found)?,
+        None => name_recordings(found),
         Some(window) => {
             let span = WindowSpan { window, hop: args.hop.unwrap_or(window / 2.0) };
             config.check_for_windows()?;

@@ -77,6 +77,8 @@ fn options_have_an_effect_or_are_refused() {
     for file in extracted(folder.path(), &["--preset", "logmel"]) {
         let part = drawn(&file, &["--start", "1", "--end", "2"]);
         assert!(part.contains(">1.2<") && !part.contains(">0.8<") && !part.contains(">2.2<"));
+        let single = drawn(&file, &["--start", "1", "--end", "1.06"]);
+        assert!(single.contains("time, seconds") && !single.contains("frame</text>"), "{single}");
         refused(&file, &["--start", "9"], "--start 9: ");
         for option in [["--fmax", "900"], ["--frequency-axis", "log"], ["--wave-scale", "channel"]]
         {
@@ -129,5 +131,11 @@ fn features_of_other_hops_share_an_axis() {
         let expected = left + width * (-0.5 * hop - from) / (to - from);
         assert!((number("x") - expected).abs() < 0.1, "{} is not {expected}", number("x"));
         assert!((number("x") + number("width") - left - width).abs() < 0.1);
+        // Where only one of them has a frame; where one has a single frame; a single one alone.
+        let part = drawn(&file, &["--start", "1.2", "--end", "1.8"]);
+        assert!(part.contains("melspectrogram") && !part.contains("zero_crossing_rate"));
+        let part = drawn(&file, &["--start", "0.9", "--end", "1.8"]);
+        assert!(part.contains("zero_crossing_rate") && part.contains("time, seconds"));
+        refused(&file, &["--start", "9"], "has no frame there");
     }
 }

@@ -158,7 +158,7 @@ impl LabelFile {
             // A file name may stand for several recordings in different folders; an id and a path
             // (of several stretches of one recording) may not.
             let (id, path) = recording;
-            let path = if path == id { recording_of(id).unwrap_or(id) } else { path };
+            let path = if path == id { recording_of(recording).unwrap_or(id) } else { path };
             let recording = (id, path);
             let other = of_name.insert(key, recording).filter(|(_, other)| *other != path);
             if let Some((other, _)) = other {
@@ -213,7 +213,7 @@ impl LabelFile {
     /// these or the file name where the column has another name.
     fn find(&self, (id, path): (&str, &str)) -> Option<(&String, &Line)> {
         let get = |key: &str| self.rows.get_key_value(key);
-        let of_window = || recording_of(id).and_then(get);
+        let of_window = || recording_of((id, path)).and_then(get);
         if self.key == Key::Id {
             return get(id).or_else(of_window);
         }
@@ -242,10 +242,15 @@ impl LabelFile {
     }
 }
 
-/// Of a window's id that of its recording: windows have `@` and where they begin after it.
-fn recording_of(id: &str) -> Option<&str> {
+/// Of a window's id that of its recording: windows have `@` and where they begin after it. A file may be
+/// called so, too.
+fn recording_of<'a>((id, path): (&'a str, &str)) -> Option<&'a str> {
     let (recording, start) = id.rsplit_once('@')?;
-    start.parse::<f64>().ok().filter(|start| start.is_finite()).map(|_| recording)
+    let is_file = path != id
+        && Path::new(path)
+            .file_stem()
+            .is_some_and(|stem| id.ends_with(stem.to_str().unwrap_or("@")));
+    start.parse::<f64>().ok().filter(|start| start.is_finite() && !is_file).map(|_| recording)
 }
 
 fn file_name(path: &str) -> Option<&str> {
@@ -326,9 +331,10 @@ mod tests {
         assert_eq!(classes(text, None).unwrap(), ["cat", "bird", "dog"]);
         let other = file("id,class\nx,cat\n", None).unwrap();
         assert!(other.for_recordings(&[("x@home", "d/x@home.wav")], &[], Path::new("f")).is_err());
-        // The recording of another path.
-        let two = [("x", "d/x.wav"), ("x@2", "d/x@2.wav")];
-        assert!(other.for_recordings(&two, &[], Path::new("f")).is_err());
+        // Files that are called like windows.
+        for files in [&[("x", "d/x.wav"), ("x@2", "d/x@2.wav")][..], &[("x@2", "d/x@2.wav")]] {
+            assert!(other.for_recordings(files, &[], Path::new("f")).is_err());
+        }
     }
 
     #[test]

@@ -24,6 +24,8 @@ struct Frames {
     values: ArrayD<f32>,
     /// Their middles in seconds, where they are known.
     times: Vec<f64>,
+    /// Seconds from one to the next, where there are two.
+    hop: Option<f64>,
 }
 
 /// Draws the frame-level arrays of one recording of an `.npz`.
@@ -49,8 +51,7 @@ pub fn draw_npz(file: &mut NpzFile, picture: &Picture) -> Result<(), Failure> {
                 true => file.f64(&times)?.into_iter().collect(),
                 false => Vec::new(),
             };
-            let feature = feature.unwrap_or_default();
-            frames.push(Frames { feature, values: file.f32(&name)?, times });
+            frames.push(Frames::new(feature.unwrap_or_default(), file.f32(&name)?, times));
         }
     }
     draw_frames(path, id, frames, picture)
@@ -70,7 +71,7 @@ pub fn draw_parquet(file: &mut ParquetFile, picture: &Picture) -> Result<(), Fai
             continue;
         }
         let feature = if features.len() > 1 { feature.clone() } else { String::new() };
-        frames.push(Frames { feature, values: found.values, times: found.times.to_vec() });
+        frames.push(Frames::new(feature, found.values, found.times.to_vec()));
     }
     draw_frames(path, id, frames, picture)
 }
@@ -99,12 +100,19 @@ fn draw_frames(
     picture: &Picture,
 ) -> Result<(), Failure> {
     picture.takes("frames", &["--channels", "--start", "--end", "--recording"])?;
+    if frames.is_empty() {
+        return Err(nothing(&path));
+    }
+    let hop = frames.iter().filter_map(|found| found.hop).reduce(f64::min);
     let mut panels = Vec::new();
     for found in frames {
-        panels.extend(found.within(picture, &path)?.panels(picture)?);
+        panels.extend(found.within(picture, &path)?.panels(picture, hop)?);
     }
+    // A feature with a long hop may have none where others have some.
+    panels.retain(|panel| panel.values.ncols() > 0);
     if panels.is_empty() {
-        return Err(nothing(&path));
+        let start = picture.view.start;
+        return Err(Failure::new(format!("--start {start}: {path} has no frame there")));
     }
     if panels.len() > MAX_PANELS {
         return Err(Failure::new(format!(
@@ -125,8 +133,7 @@ fn draw_frames(
 /// Draws the one array of an `.npy`.
 pub fn draw_array(path: &Path, values: ArrayD<f32>, picture: &Picture) -> Result<(), Failure> {
     picture.takes("an array", &["--channels"])?;
-    let frames = Frames { feature: String::new(), values, times: Vec::new() };
-    let panels = frames.panels(picture)?;
+    let panels = Frames::new(String::new(), values, Vec::new()).panels(picture, None)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     picture.save(&FeaturePicture {
         title: picture.title.clone().unwrap_or(name),
@@ -147,6 +154,14 @@ fn nothing(path: &str) -> Failure {
 }
 
 impl Frames {
+    fn new(feature: String, values: ArrayD<f32>, times: Vec<f64>) -> Self {
+        let hop = match times[..] {
+            [first, .., last] if last > first => Some((last - first) / (times.len() - 1) as f64),
+            _ => None,
+        };
+        Self { feature, values, times, hop }
+    }
+
     /// The frames of the stretch that is to be drawn.
     fn within(mut self, picture: &Picture, path: &str) -> Result<Self, Failure> {
         let (start, end) = (picture.view.start, picture.end);
@@ -159,17 +174,18 @@ impl Frames {
         }
         let from = self.times.partition_point(|time| *time < start);
         let to = self.times.partition_point(|time| end.is_none_or(|end| *time < end)).max(from);
-        if from == to {
-            return Err(Failure::new(format!("--start {start}: {path} has no frame there")));
-        }
         self.values = self.values.slice_axis(last, (from..to).into()).to_owned();
         self.times = self.times[from..to].to_vec();
         Ok(self)
     }
 
-    /// A panel for each channel.
-    fn panels(self, picture: &Picture) -> Result<Vec<FeaturePanel>, Failure> {
-        let Self { feature, values, times } = self;
+    /// A panel for each channel. A single frame reaches as far as one of `other_hop`.
+    fn panels(
+        self,
+        picture: &Picture,
+        other_hop: Option<f64>,
+    ) -> Result<Vec<FeaturePanel>, Failure> {
+        let Self { feature, values, times, hop } = self;
         let shape = values.shape().to_vec();
         let cube = match shape.len() {
             3 => values.into_dimensionality::<Ix3>()?,
@@ -187,15 +203,10 @@ impl Frames {
             false => picture.view.channels.clone(),
         };
         let step = cube.len_of(Axis(2)).div_ceil(MOST_FRAMES).max(1);
-        let span = match times[..] {
-            [first, .., last] if last > first => {
-                // Each frame reaches half way to its neighbours.
-                let hop = (last - first) / (times.len() - 1) as f64;
-                let drawn = times.len().div_ceil(step) * step;
-                Some((first - hop / 2.0, first + hop * (drawn as f64 - 0.5)))
-            }
-            _ => None,
-        };
+        // Each frame reaches half way to its neighbours.
+        let drawn = (times.len().div_ceil(step) * step) as f64;
+        let span = times.first().zip(hop.or(other_hop));
+        let span = span.map(|(first, hop)| (first - hop / 2.0, first + hop * (drawn - 0.5)));
         let panel = |channel: usize| FeaturePanel {
             label: match &*feature {
                 "" => format!("channel {channel}"),

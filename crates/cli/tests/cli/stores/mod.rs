@@ -306,17 +306,17 @@ fn manifests_name_objects_files_and_web_addresses() {
     twins.stored(twins.at("first.csv"), "first.npz", &["--preset", "mfcc-zcr"]).with(0);
     assert_eq!(table(&twins.at("first.npz")).ids(), ["audio/a@0.0-0.1", "audio/a@0.1-0.2"]);
 
-    // Recordings that only their queries tell apart would be one group of folds.
-    let (one, two) = (twins.store.web("get?file=1"), twins.store.web("get?file=2"));
-    let rows = format!("path,start,end\n{one},0,0.1\n{one},0.1,0.2\n{two},0,0.1\n");
+    // Recordings that only their queries tell apart are groups of their own, with windows and without.
+    let (one, two) = (twins.store.web("f%201.wav?v=1"), twins.store.web("f%201.wav?v=2"));
+    let rows = format!("id,path,start,end\na,{one},0,0.1\nb,{one},0.1,0.2\nc,{two},0,0.1\n");
     fs::write(twins.at("queries.csv"), &rows).unwrap();
-    let run = twins.stored(twins.at("queries.csv"), "x.npz", &[]).with(2);
-    assert!(
-        run.stderr.contains("/web/get: several recordings share this address"),
-        "{}",
-        run.stderr
-    );
-    assert!(run.stderr.contains("add a column recording"), "{}", run.stderr);
+    for (name, options) in [("whole.npz", &[][..]), ("cut.npz", &["--window", "0.1"])] {
+        let options = [&["--preset", "mfcc-zcr"], options].concat();
+        twins.stored(twins.at("queries.csv"), name, &options).with(0);
+        let found = table(&twins.at(name));
+        let (_, groups) = found.labels().find(|(label, _)| *label == "recording").unwrap();
+        assert_eq!(groups, ["a", "a", "c"], "{name}");
+    }
 
     fs::write(twins.at("tar.csv"), "path\ns3://lab/s.tar\n").unwrap();
     let run = twins.stored(twins.at("tar.csv"), "x.npz", &[]).with(2);
