@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use corsmal_files::draft;
 use corsmal_vision::{Detection, Rgb};
 
-use crate::capacity::{Problem, Views, each, key, require_colours, training};
+use crate::capacity::{Problem, Views, each, key, require_colours, require_own_tables, training};
 use crate::dataset::{DataSet, Recording};
 use crate::error::{CcmError, Result};
 use crate::submission::RowKey;
@@ -124,6 +124,7 @@ fn write_into(
     let labelled = |r: &Recording| r.container.is_some() && r.name.is_some();
     let recordings: Vec<Recording> = training(&set).into_iter().filter(labelled).collect();
     require_colours(&recordings)?;
+    require_own_tables(&recordings, detections)?;
     let found = each(&recordings, jobs, &|_, _| {}, interrupted, |recording| {
         write_recording(recording, detections, hidden, interrupted)
     })?;

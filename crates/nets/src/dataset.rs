@@ -151,13 +151,14 @@ impl Dataset {
     /// `about` says how they were made.
     ///
     /// # Errors
-    /// [`ItemsError::Npz`].
+    /// [`ItemsError::Npz`]; a column with the name of another member.
     pub fn write_sequences(
         &self,
         path: &Path,
         numbers: usize,
         about: &str,
     ) -> Result<(), ItemsError> {
+        require_names(path, self.columns.iter().map(|(name, _)| name.as_str()))?;
         let column = &self.items.columns[0];
         let io = |e| NpzError::io(path, e);
         let draft = Draft::create(path).map_err(io)?;
@@ -183,6 +184,26 @@ impl Dataset {
     /// A column by name.
     pub fn column(&self, name: &str) -> Option<&[String]> {
         self.columns.iter().find(|(n, _)| n == name).map(|(_, values)| values.as_slice())
+    }
+}
+
+/// Refuses columns that are called as other members of a file of sequences are.
+///
+/// # Errors
+/// Such a column.
+pub fn require_names<'a>(
+    path: &Path,
+    columns: impl IntoIterator<Item = &'a str>,
+) -> Result<(), ItemsError> {
+    const MEMBERS: [&str; 4] = ["X", "offsets", "ids", "__made__"];
+    match columns.into_iter().find(|name| MEMBERS.contains(name)) {
+        None => Ok(()),
+        Some(name) => {
+            let reason = format!(
+                "a label column is called {name}, as the file's own member: rename the column"
+            );
+            Err(ItemsError::Content { path: path.display().to_string(), reason })
+        }
     }
 }
 
@@ -322,6 +343,13 @@ mod tests {
         assert_eq!((&read.ids, &read.items), (&written.ids, &written.items));
         assert_eq!(read.column("level"), Some(&written.columns[0].1[..]));
         assert!(read.column("__made__").is_none());
+        // The file had two members of that name, and nothing read it.
+        for name in ["X", "offsets", "ids", "__made__"] {
+            let columns = vec![(name.into(), vec!["0".into(), "2".into()])];
+            let other = Dataset { ids: written.ids.clone(), columns, items: written.items.clone() };
+            let refused = other.write_sequences(&path, 128, "{}").unwrap_err().to_string();
+            assert!(refused.contains("rename the column"), "{refused}");
+        }
         // `inspect` and `compare` would look for the tables of extracted features.
         assert!(!corsmal_files::layout::is_ours(&NpzFile::open(&path).unwrap()));
     }

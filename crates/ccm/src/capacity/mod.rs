@@ -9,6 +9,7 @@ mod model;
 mod options;
 mod regions;
 mod table;
+mod tables;
 mod views;
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -28,6 +29,7 @@ pub use model::{CapacityModel, HeldOut};
 pub use options::{CapacityOptions, Method};
 pub use regions::{LabelledRegion, Regions, regions};
 pub use table::{Measured, PRIOR_MASS_G, Row, read, write};
+pub(crate) use tables::require_own_tables;
 pub use views::{Frame, Kind, Problem, Views};
 
 /// Estimates every recording of a data set, in its order. `progress` hears how many are done.
@@ -51,6 +53,7 @@ pub fn run(
         return Err(CcmError::Request("method m2 needs its network: a model of `corsmal-feat capacity train --method m2`, or weights".into()));
     }
     let set = DataSet::open(&options.data)?;
+    require_own_tables(&set.recordings, options.detections.as_deref())?;
     each(&set.recordings, options.jobs, progress, interrupted, |recording| {
         let started = Instant::now();
         let views = Views::of(recording, options.detections.as_deref());
@@ -168,6 +171,7 @@ pub fn train(
     let fused = options.method == Method::Fused;
     let set = DataSet::open(&options.data)?;
     let recordings = training(&set);
+    require_own_tables(&recordings, options.detections.as_deref())?;
     let results = each(&recordings, options.jobs, progress, interrupted, |recording| {
         sample(&set, recording, options).transpose().map(|result| (key(recording), result))
     })?;

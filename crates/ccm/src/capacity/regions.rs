@@ -6,7 +6,7 @@ use corsmal_vision::region::Region;
 use serde_json::{Value, json};
 
 use super::views::{Problem, Views};
-use super::{CapacityOptions, each, key, labelled, methods, training};
+use super::{CapacityOptions, each, key, labelled, methods, require_own_tables, training};
 use crate::dataset::DataSet;
 use crate::error::{CcmError, Result};
 use crate::submission::RowKey;
@@ -48,6 +48,7 @@ pub fn regions(
 ) -> Result<Regions> {
     let set = DataSet::open(&options.data)?;
     let recordings = training(&set);
+    require_own_tables(&recordings, options.detections.as_deref())?;
     let results = each(&recordings, options.jobs, progress, interrupted, |recording| {
         let (container, capacity) = labelled(&set, recording)?;
         let views = Views::of(recording, options.detections.as_deref());

@@ -182,7 +182,13 @@ impl Views {
             }
         }
         frames.sort_by(|a, b| (a.number, &a.path).cmp(&(b.number, &b.path)));
-        Ok(frames)
+        match frames.windows(2).find(|pair| pair[0].number == pair[1].number) {
+            None => Ok(frames),
+            Some(pair) => {
+                let [one, other] = [&pair[0], &pair[1]].map(|frame| frame.path.display());
+                Err(Problem::Damaged(format!("{one} and {other} are images of the same frame")))
+            }
+        }
     }
 
     /// The video of a view, where there is one. Its index is read once.
@@ -214,11 +220,8 @@ impl Views {
         }
     }
 
-    /// What a detector saw in all views; `None` where there is no table.
-    ///
-    /// # Errors
-    /// The table is damaged, or about frames that a video does not have.
-    pub fn detections(&self) -> Result<Option<Vec<Detection>>, Problem> {
+    /// Where its table of detections is, if there is one.
+    pub(super) fn table(&self) -> Option<PathBuf> {
         let own = self.base.join("detections");
         let folder = self.detections.as_ref().unwrap_or(&own);
         let mut folders = vec![folder.clone()];
@@ -228,8 +231,15 @@ impl Views {
         let tables = folders.iter().flat_map(|folder| {
             ["csv", "json"].map(|extension| folder.join(format!("{}.{extension}", self.stem)))
         });
-        let mut tables = tables.filter(|path| path.is_file());
-        let Some(path) = tables.next() else { return Ok(None) };
+        tables.into_iter().find(|path| path.is_file())
+    }
+
+    /// What a detector saw in all views; `None` where there is no table.
+    ///
+    /// # Errors
+    /// The table is damaged, or about frames that a video does not have.
+    pub fn detections(&self) -> Result<Option<Vec<Detection>>, Problem> {
+        let Some(path) = self.table() else { return Ok(None) };
         let detections = read_detections(&path)?;
         self.require_frames(&detections)
             .map_err(|reason| Problem::Damaged(format!("{}: {reason}", path.display())))?;

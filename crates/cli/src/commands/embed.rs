@@ -103,6 +103,8 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     crate::publish::check(&args.out, args.overwrite)?;
     let embedder = Embedder::new(&args.network, weights)?;
     let found = recordings::named(&args.paths, recordings::warn)?;
+    let columns = found.iter().flat_map(|input| &input.labels).map(|(name, _)| name.as_str());
+    corsmal_nets::dataset::require_names(&args.out, columns)?;
     let stop = crate::interrupt::flag();
     let mut failed = 0;
     let embedded = embedder.embed(&found, args.jobs.count(), stop, |input, status, reason| {

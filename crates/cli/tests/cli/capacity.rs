@@ -206,7 +206,11 @@ fn options_of_other_methods_are_refused() {
         (["m5", "--model", "a"], "--model is for m2, m3 and fused; --method is m5"),
         (["m4", "--model", "a"], "--model is for m2, m3 and fused; --method is m4"),
         (["m3", "--weights", "a"], "--weights is for m2; --method is m3"),
-        (["m5", "--outliers", "kept"], "--outliers is for m4 and fused; --method is m5"),
+        (["m5", "--outliers", "kept"], "--outliers is for m4; --method is m5"),
+        (["fused", "--outliers", "kept"], "--outliers is for m4; --method is fused"),
+        (["fused", "--variant", "published"], "--variant is for m2, m4 and m5; --method is fused"),
+        (["m3", "--variant", "corrected"], "--variant is for m2, m4 and m5; --method is m3"),
+        (["m5", "--seed", "2"], "--seed is for m3, m4 and fused; --method is m5"),
     ] {
         let found = refused(&[&of[..], &words].concat());
         assert!(found.contains(message), "{found}");

@@ -170,6 +170,37 @@ fn crops_train_a_network_that_classifies_pictures() {
     refuse(&["classify", "-m", text(&model), text(&crops), "--window", "1"], "for recordings");
 }
 
+/// Every container had the table of one, and a frame of two images counted twice.
+#[test]
+fn tables_and_images_belong_to_one_recording_and_frame() {
+    let folder = tempfile::tempdir().unwrap();
+    data(folder.path());
+    let flat = folder.path().join("flat");
+    std::fs::create_dir(&flat).unwrap();
+    let table = format!("{}.csv", NAMES[1]);
+    let own = folder.path().join("train/1/detections").join(&table);
+    std::fs::copy(own, flat.join(&table)).unwrap();
+    let out = folder.path().join("crops");
+    let crops =
+        ["crops", "--data", text(folder.path()), "--detections", text(&flat), "-o", text(&out)];
+    let said = refused(&crops);
+    assert!(said.contains("this would be the table of ") && said.contains("flat/1/"), "{said}");
+    // By container, the others have none.
+    std::fs::create_dir(flat.join("1")).unwrap();
+    std::fs::rename(flat.join(&table), flat.join("1").join(&table)).unwrap();
+    done(&crops);
+    let pictures = std::fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name());
+    let pictures: Vec<_> = pictures.map(|name| name.into_string().unwrap()).collect();
+    assert!(pictures.iter().filter(|n| n.ends_with(".png")).all(|n| n.starts_with("1_")));
+
+    let images = folder.path().join(format!("train/1/rgb/{}/c1", NAMES[1]));
+    std::fs::copy(images.join("0003.png"), images.join("3.png")).unwrap();
+    let again = folder.path().join("again");
+    let output = run(&["crops", "--data", text(folder.path()), "-o", text(&again)]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(1) && said.contains("images of the same frame"), "{said}");
+}
+
 #[test]
 fn each_view_answers_alone_in_the_benchmark() {
     let folder = tempfile::tempdir().unwrap();

@@ -104,18 +104,26 @@ fn entries(value: Value) -> Result<Vec<(String, Tensor)>, String> {
         return Err("it does not hold a dictionary of tensors".into());
     };
     let mut tensors = Vec::new();
-    let mut inner = None;
+    let mut inner: Option<(String, Vec<(String, Tensor)>)> = None;
     for (key, value) in dict {
         match (key, value) {
             (Value::Text(name), Value::Tensor(tensor)) => tensors.push((name, tensor)),
             (Value::Text(name), value @ Value::Dict(_)) if INNER.contains(&name.as_str()) => {
-                inner = Some(value);
+                match (entries(value), &inner) {
+                    (Ok(found), Some((other, before))) if found != *before => {
+                        return Err(format!(
+                            "{other} and {name} are dictionaries of different tensors: save the one that is meant"
+                        ));
+                    }
+                    (Ok(found), None) => inner = Some((name, found)),
+                    _ => (),
+                }
             }
             _ => (),
         }
     }
     match inner {
-        Some(inner) if tensors.is_empty() => entries(inner),
+        Some((_, inner)) if tensors.is_empty() => Ok(inner),
         _ if tensors.is_empty() => Err("it does not hold a dictionary of tensors".into()),
         _ => Ok(tensors),
     }

@@ -164,7 +164,8 @@ impl<'a> Machine<'a> {
                 other => {
                     return Err(format!(
                         "operation {:?}; only lists, dictionaries, strings, numbers and numpy \
-                         arrays of protocol 0 are read",
+                         arrays of protocol 0, as Python 2 writes them, are read; write JSON with the \
+                         keys intrinsic and extrinsic instead",
                         char::from(other)
                     ));
                 }

@@ -67,8 +67,9 @@ struct Estimate {
     #[command(flatten)]
     source: Source,
     /// How closely to follow a published method.
-    #[arg(long, value_enum, default_value = "corrected")]
-    variant: VariantName,
+    /// m2, m4 and m5 [default: corrected]
+    #[arg(long, value_enum)]
+    variant: Option<VariantName>,
     /// How m4 drops outliers; by default as in --variant.
     #[arg(long, value_enum)]
     outliers: Option<OutliersName>,
@@ -145,10 +146,16 @@ fn estimate(args: Estimate) -> Result<ExitCode, Failure> {
     if args.weights.is_some() && method != Method::M2 {
         return Err(unused("--weights", "m2", method));
     }
-    if args.outliers.is_some() && !matches!(method, Method::M4 | Method::Fused) {
-        return Err(unused("--outliers", "m4 and fused", method));
+    if args.variant.is_some() && matches!(method, Method::M3 | Method::Fused) {
+        return Err(unused("--variant", "m2, m4 and m5", method));
     }
-    let mut options = args.source.options(method, args.variant);
+    if args.outliers.is_some() && method != Method::M4 {
+        return Err(unused("--outliers", "m4", method));
+    }
+    if args.source.seed.is_some() && matches!(method, Method::M2 | Method::M5) {
+        return Err(unused("--seed", "m3, m4 and fused", method));
+    }
+    let mut options = args.source.options(method, args.variant.unwrap_or(VariantName::Corrected));
     if let Some(outliers) = args.outliers {
         options.outliers = match outliers {
             OutliersName::Published => Outliers::Published,

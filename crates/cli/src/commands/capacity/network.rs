@@ -14,7 +14,7 @@ use corsmal_vision::region::Region;
 use serde_json::json;
 
 use super::learning::{Args, SYNTHETIC, ended};
-use super::source::{VariantName, learned_containers};
+use super::source::{SEED, VariantName, learned_containers};
 use crate::failure::{Failure, INTERRUPTED};
 use crate::interrupt;
 use crate::networks::tell;
@@ -57,7 +57,7 @@ pub(super) fn read(
 /// Trains it on the regions of a data set's training recordings.
 pub(super) fn train(args: Args) -> Result<ExitCode, Failure> {
     let mut changes = key_values(&args.parameters)?;
-    if changes.insert("seed".into(), args.source.seed.into()).is_some() {
+    if changes.insert("seed".into(), args.source.seed.unwrap_or(SEED).into()).is_some() {
         return Err(Failure::new("--set seed=…: give --seed instead"));
     }
     let recipe = network::recipe(&changes)?;

@@ -9,6 +9,9 @@ use corsmal_vision::lode::Variant;
 
 use crate::args::Jobs;
 
+/// The seed, unless one is given.
+pub(super) const SEED: u64 = 1;
+
 /// Where recordings and detections are.
 #[derive(clap::Args)]
 pub(super) struct Source {
@@ -19,9 +22,9 @@ pub(super) struct Source {
     /// `detections/` next to each recording's audio folder.
     #[arg(long, value_name = "DIR")]
     detections: Option<PathBuf>,
-    /// Seed of votes, isolation forests and the training of m2's network.
-    #[arg(long, default_value_t = 1)]
-    pub(super) seed: u64,
+    /// Seed of votes, isolation forests and the training of m2's network [default: 1]
+    #[arg(long)]
+    pub(super) seed: Option<u64>,
     #[command(flatten)]
     pub(super) jobs: Jobs,
 }
@@ -46,7 +49,7 @@ impl Source {
             model: None,
             network: None,
             jobs: self.jobs.count(),
-            seed: self.seed,
+            seed: self.seed.unwrap_or(SEED),
         }
     }
 }

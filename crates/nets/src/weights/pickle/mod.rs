@@ -14,7 +14,8 @@ const MAX_WORK: usize = 2 * MAX_VALUES;
 
 /// Reads one pickle.
 pub(super) fn read(bytes: &[u8]) -> Result<Value, String> {
-    let mut machine = Machine { bytes, at: 0, stack: Vec::new(), memo: Vec::new(), work: 0 };
+    let (stack, memo, growing) = (Vec::new(), Vec::new(), Vec::new());
+    let mut machine = Machine { bytes, at: 0, stack, memo, growing, work: 0 };
     loop {
         if let Some(value) = machine.step()? {
             return Ok(value);
@@ -27,6 +28,9 @@ struct Machine<'a> {
     at: usize,
     stack: Vec<Value>,
     memo: Vec<Value>,
+    /// where lists and dictionaries of the memo are on the stack: the memo refers to them, and gets what is
+    /// added to them later
+    growing: Vec<(usize, usize)>,
     /// values made and copied so far
     work: usize,
 }
@@ -64,6 +68,7 @@ impl Machine<'_> {
             return Err(format!("more than {MAX_VALUES} values"));
         }
         self.spend(1)?;
+        self.forget_popped();
         self.stack.push(value);
         Ok(())
     }
@@ -94,7 +99,33 @@ impl Machine<'_> {
         if self.memo.len() <= index {
             self.memo.resize(index + 1, Value::None);
         }
+        self.forget_popped();
+        if matches!(value, Value::List(_) | Value::Dict(_)) {
+            self.growing.push((self.stack.len() - 1, index));
+        }
         self.memo[index] = value;
+        Ok(())
+    }
+
+    /// Drops places of what is on the stack no more.
+    fn forget_popped(&mut self) {
+        let height = self.stack.len();
+        while self.growing.last().is_some_and(|(place, _)| *place >= height) {
+            self.growing.pop();
+        }
+    }
+
+    /// Has the memo hold what the list or dictionary on top of the stack is now.
+    fn grow(&mut self) -> Result<(), String> {
+        self.forget_popped();
+        let (Some(&(place, index)), Some(value)) = (self.growing.last(), self.stack.last()) else {
+            return Ok(());
+        };
+        if place + 1 == self.stack.len() {
+            let value = value.clone();
+            self.count(&value)?;
+            self.memo[index] = value;
+        }
         Ok(())
     }
 
@@ -188,6 +219,7 @@ impl Machine<'_> {
                     Some(Value::List(list)) => list.extend(items),
                     _ => return Err("a value is appended to something that is not a list".into()),
                 }
+                self.grow()?;
             }
             b's' | b'u' => {
                 let items = if code == b's' {
@@ -204,6 +236,7 @@ impl Machine<'_> {
                 while let (Some(key), Some(value)) = (items.next(), items.next()) {
                     dict.push((key, value));
                 }
+                self.grow()?;
             }
             b'c' => {
                 let (module, name) = (self.line()?, self.line()?);
@@ -265,4 +298,24 @@ impl Machine<'_> {
 fn shallow(items: Vec<Value>) -> Result<Vec<Value>, String> {
     items.iter().try_for_each(|item| size(item, 1).map(|_| ()))?;
     Ok(items)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What was added to a list after its first use was missing where it was used again.
+    #[test]
+    fn what_is_recalled_is_whole() {
+        // {"a": [5, 6], "b": the same list}
+        let shared = b"\x80\x02}q\x00(X\x01\0\0\0a]q\x01(K\x05K\x06eX\x01\0\0\0bh\x01u.";
+        let list = Value::List(vec![Value::Int(5), Value::Int(6)]);
+        let key = |name: &str| Value::Text(name.into());
+        let both = vec![(key("a"), list.clone()), (key("b"), list)];
+        assert_eq!(read(shared).unwrap(), Value::Dict(both));
+        // A list in the place of one that was dropped is not that one: [dropped, [7]]
+        let dropped = b"\x80\x02(]q\x000]K\x07ah\x00t.";
+        let seven = Value::List(vec![Value::Int(7)]);
+        assert_eq!(read(dropped).unwrap(), Value::Tuple(vec![seven, Value::List(Vec::new())]));
+    }
 }
