@@ -174,6 +174,7 @@ pub fn run(
                 }
                 Err(CcmError::Request(reason)) => {
                     let name = system.name();
+                    let reason = reason.strip_prefix(&format!("{name}: ")).unwrap_or(&reason);
                     progress(&format!("warning: {name} is left out: {reason}"));
                     failed.push(format!("{name}: {reason}"));
                 }
