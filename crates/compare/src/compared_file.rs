@@ -261,7 +261,8 @@ impl ComparedFile {
         let (texts, kept): (Vec<usize>, Vec<usize>) =
             (0..table.names.len()).partition(|&i| is_text(i));
         for &at in &texts {
-            let spelled = |x: &f64| if x.is_nan() { String::new() } else { format!("{x:.0}") };
+            let spelled =
+                |x: &f64| if x.is_nan() { String::new() } else { format!("{:.0}", x + 0.0) };
             let values: Vec<String> = table.values.column(at).iter().map(spelled).collect();
             self.texts.push(TextColumn {
                 name: table.names[at].clone(),

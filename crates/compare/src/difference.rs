@@ -54,7 +54,7 @@ fn same(a: f64, b: f64) -> bool {
     a == b || (a.is_nan() && b.is_nan())
 }
 
-/// The largest difference beyond the tolerance, or else of all, and where it is.
+/// The largest difference and where it is.
 #[derive(Debug, Clone, Serialize)]
 pub struct Extreme {
     /// `|a - b|`.
@@ -69,8 +69,8 @@ pub struct Extreme {
     pub position: String,
     /// Where in it, along each axis.
     pub index: Vec<usize>,
-    #[serde(skip)]
-    is_beyond: bool,
+    /// Whether it is beyond the tolerance.
+    pub is_beyond: bool,
 }
 
 /// Statistics of the differences between values that stand in the same places.
@@ -84,8 +84,10 @@ pub struct Difference {
     pub within: u64,
     /// Values that are finite in one file only.
     pub one_sided: u64,
-    /// The largest difference of finite values, beyond the tolerance where there is one.
+    /// The largest difference beyond the tolerance, where there is none the largest; of finite values.
     pub largest: Option<Extreme>,
+    /// Largest `|a - b|`.
+    pub max_absolute: f64,
     /// Largest `|a - b| / max(|a|, |b|)`.
     pub max_relative: f64,
     /// Root of the mean square of the differences of finite values.
@@ -129,6 +131,7 @@ impl Difference {
             }
             moments.push(a, b);
             let value = (a - b).abs();
+            self.max_absolute = self.max_absolute.max(value);
             if value > 0.0 {
                 self.max_relative = self.max_relative.max(value / a.abs().max(b.abs()));
             }

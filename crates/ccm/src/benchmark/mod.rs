@@ -33,6 +33,7 @@ use corsmal_models::pipeline::{Pipeline, PipelineSpec};
 use corsmal_report::Report;
 use rayon::prelude::*;
 
+use crate::capacity::require_own_tables;
 use crate::dataset::{Container, DataSet, Subset};
 use crate::error::{CcmError, Result};
 use baselines::BaselineResult;
@@ -143,6 +144,7 @@ pub fn run(
         tables.map(|t| Added::capacities(&t.name, &t.path)).collect::<Result<_>>()?;
     let set = DataSet::open(&options.data)?;
     let rows = Rows::of(&set)?;
+    require_own_tables(&set.recordings, options.detections.as_deref())?;
     let added = added.iter().map(|a| a.place(&rows)).collect::<Result<Vec<_>>>()?;
     let tables = tables.iter().zip(&options.capacities);
     let capacities =

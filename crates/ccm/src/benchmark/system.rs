@@ -9,7 +9,7 @@ use super::matrix::inputs;
 use super::method::file_name;
 use super::protocols::container_folds;
 use super::results::{Estimate, Rows};
-use crate::capacity::{Views, require_own_tables};
+use crate::capacity::Views;
 use crate::dataset::{DataSet, Filling, SequenceName};
 use crate::error::{CcmError, Result};
 use crate::paper;
@@ -138,9 +138,6 @@ impl<'a> Work<'a> {
                 });
             }
         }
-        let targets = rows.training.iter().chain(rows.tests.iter().flat_map(|test| &test.rows));
-        let recordings: Vec<_> = targets.map(|target| target.recording.clone()).collect();
-        require_own_tables(&recordings, detections)?;
         let features = features.to_path_buf();
         let training = rows.training.len();
         Ok(Self { subjects, training, features, jobs, seed, progress, stop })

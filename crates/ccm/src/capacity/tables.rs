@@ -19,15 +19,18 @@ pub(crate) fn require_own_tables(
         let views = Views::of(recording, detections);
         let Some(table) = views.table() else { continue };
         if let Some(other) = owners.insert(table.clone(), recording) {
-            let own = |recording| Views::of(recording, detections).table_in(folder);
+            let own = |recording| {
+                let table = Views::of(recording, detections).table_in(folder);
+                table.parent().unwrap_or(folder).display().to_string()
+            };
             return Err(CcmError::Request(format!(
                 "{}: this would be the table of {} and of {}: put tables into a folder for each container, \
                  such as {} and {}",
                 table.display(),
                 other.path.display(),
                 recording.path.display(),
-                own(other).display(),
-                own(recording).display(),
+                own(other),
+                own(recording),
             )));
         }
     }

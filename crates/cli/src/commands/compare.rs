@@ -206,7 +206,7 @@ fn table(features: &[FeatureReport]) -> Vec<String> {
             f.arrays.to_string(),
             f.differing.to_string(),
             some(percent(d.equal, d.values)),
-            some(number(d.largest.as_ref().map_or(0.0, |e| e.value))),
+            some(number(d.max_absolute)),
             some(number(d.max_relative)),
             some(number(d.rms)),
             d.correlation.map_or("-".into(), |r| format!("{r:.6}")),
@@ -245,8 +245,12 @@ fn details(feature: &FeatureReport, lines: &mut Vec<String>) {
         let place =
             if e.position.is_empty() { String::new() } else { format!(" at {}", e.position) };
         lines.push(format!(
-            "  largest difference {:.6e}: {} and {} in {}{place}",
-            e.value, e.a, e.b, e.array
+            "  largest difference{} {:.6e}: {} and {} in {}{place}",
+            if e.is_beyond { " beyond the tolerance" } else { "" },
+            e.value,
+            e.a,
+            e.b,
+            e.array
         ));
     }
     if d.one_sided > 0 {

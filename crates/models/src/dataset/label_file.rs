@@ -246,10 +246,8 @@ impl LabelFile {
 /// called so, too.
 fn recording_of<'a>((id, path): (&'a str, &str)) -> Option<&'a str> {
     let (recording, start) = id.rsplit_once('@')?;
-    let is_file = path != id
-        && Path::new(path)
-            .file_stem()
-            .is_some_and(|stem| id.ends_with(stem.to_str().unwrap_or("@")));
+    let stem = Path::new(path).file_stem().and_then(|stem| stem.to_str());
+    let is_file = path != id && stem.is_some_and(|stem| stem.contains('@') && id.ends_with(stem));
     start.parse::<f64>().ok().filter(|start| start.is_finite() && !is_file).map(|_| recording)
 }
 
@@ -314,6 +312,11 @@ mod tests {
     #[test]
     fn windows_have_the_labels_of_their_recording() {
         let windows = [("x@0", "d/x.wav"), ("x@0.5", "d/x.wav"), ("y@2", "d/y@2.wav")];
+        // Names that times end in.
+        let numbers = [("5@0.5", "d/5.wav"), ("0@0", "d/0.wav")];
+        let found = file("id,class\n5,cat\n0,dog\n", None).unwrap();
+        let found = found.for_recordings(&numbers, &[], Path::new("f.npz")).unwrap();
+        assert_eq!(found.0[0].1, ["cat", "dog"]);
         let classes = |text: &str, key| {
             let columns = file(text, key)?.for_recordings(&windows, &[], Path::new("f.npz"))?;
             Ok::<_, DatasetError>(columns.0[0].1.clone())

@@ -98,35 +98,51 @@ fn member(
     Ok(bytes)
 }
 
-/// Tensors by name, from the dictionary itself or from one of its known keys.
-fn entries(value: Value) -> Result<Vec<(String, Tensor)>, String> {
-    let Value::Dict(dict) = value else {
-        return Err("it does not hold a dictionary of tensors".into());
-    };
+/// Tensors by name.
+type Entries = Vec<(String, Tensor)>;
+
+/// Those of the dictionary itself or, where it has none, of one of its known keys.
+fn entries(value: Value) -> Result<Entries, String> {
+    const NONE: &str = "it does not hold a dictionary of tensors";
+    let Value::Dict(dict) = value else { return Err(NONE.into()) };
     let mut tensors = Vec::new();
-    let mut inner: Option<(String, Vec<(String, Tensor)>)> = None;
+    let mut inner: Option<(String, Entries)> = None;
+    let (mut conflict, mut fault) = (None, None);
     for (key, value) in dict {
         match (key, value) {
             (Value::Text(name), Value::Tensor(tensor)) => tensors.push((name, tensor)),
             (Value::Text(name), value @ Value::Dict(_)) if INNER.contains(&name.as_str()) => {
                 match (entries(value), &inner) {
-                    (Ok(found), Some((other, before))) if found != *before => {
-                        return Err(format!(
-                            "{other} and {name} are dictionaries of different tensors: save the one that is meant"
+                    (Ok(found), None) => inner = Some((name, found)),
+                    (Ok(found), Some((other, before))) if !are_same(&found, before) => {
+                        conflict = Some(format!(
+                            "{other} and {name} are dictionaries of different tensors: save the one \
+                             that is meant"
                         ));
                     }
-                    (Ok(found), None) => inner = Some((name, found)),
-                    _ => (),
+                    (Ok(_), Some(_)) => (),
+                    (Err(inside), _) => fault = Some(inside),
                 }
             }
             _ => (),
         }
     }
-    match inner {
-        Some((_, inner)) if tensors.is_empty() => Ok(inner),
-        _ if tensors.is_empty() => Err("it does not hold a dictionary of tensors".into()),
-        _ => Ok(tensors),
+    match (inner, conflict) {
+        _ if !tensors.is_empty() => Ok(tensors),
+        (_, Some(conflict)) => Err(conflict),
+        (Some((_, inner)), None) => Ok(inner),
+        (None, None) => Err(fault.unwrap_or_else(|| NONE.into())),
     }
+}
+
+/// Whether they are the same, in any order.
+fn are_same(one: &Entries, other: &Entries) -> bool {
+    let sorted = |entries: &Entries| {
+        let mut sorted: Vec<(String, Tensor)> = entries.clone();
+        sorted.sort_by(|a, b| a.0.cmp(&b.0));
+        sorted
+    };
+    one == other || sorted(one) == sorted(other)
 }
 
 fn count(tensor: &Tensor) -> Option<usize> {
@@ -152,4 +168,34 @@ fn view(tensor: &Tensor, count: usize, values: &[f32]) -> Option<Vec<f32>> {
         }
     }
     Some(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::pickle::Storage;
+    use super::*;
+    use crate::weights::numbers::Kind;
+
+    #[test]
+    fn one_dictionary_of_tensors_is_found() {
+        let tensor = |key: &str| {
+            let storage = Storage { kind: Kind::F32, key: key.into(), len: 1 };
+            Value::Tensor(Tensor { storage, offset: 0, shape: vec![1], strides: vec![1] })
+        };
+        let dict = |items: &[(&str, Value)]| {
+            let pair = |(key, value): &(&str, Value)| (Value::Text((*key).into()), value.clone());
+            Value::Dict(items.iter().map(pair).collect())
+        };
+        let one = dict(&[("a", tensor("0")), ("b", tensor("1"))]);
+        let turned = dict(&[("b", tensor("1")), ("a", tensor("0"))]);
+        let other = dict(&[("a", tensor("2")), ("b", tensor("1"))]);
+        let names = |value: Value| entries(value).map(|found| found.len());
+        assert_eq!(names(one.clone()), Ok(2));
+        assert_eq!(names(dict(&[("model", one.clone()), ("state_dict", turned)])), Ok(2));
+        assert_eq!(names(dict(&[("model", dict(&[])), ("state_dict", one.clone())])), Ok(2));
+        let two = dict(&[("model", one.clone()), ("state_dict", other)]);
+        assert!(names(two.clone()).unwrap_err().contains("different tensors"));
+        assert!(names(dict(&[("model", two.clone())])).unwrap_err().contains("different tensors"));
+        assert_eq!(names(dict(&[("a", tensor("0")), ("model", two)])), Ok(1));
+    }
 }

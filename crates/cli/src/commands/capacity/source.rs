@@ -22,7 +22,8 @@ pub(super) struct Source {
     /// `detections/` next to each recording's audio folder.
     #[arg(long, value_name = "DIR")]
     detections: Option<PathBuf>,
-    /// Seed of votes, isolation forests and the training of m2's network [default: 1]
+    /// Seed of votes (m3, fused), isolation forests (m4, fused) and the training of m2's network
+    /// [default: 1]
     #[arg(long)]
     pub(super) seed: Option<u64>,
     #[command(flatten)]

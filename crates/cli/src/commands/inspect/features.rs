@@ -112,7 +112,8 @@ fn draw_frames(
     panels.retain(|panel| panel.values.ncols() > 0);
     if panels.is_empty() {
         let start = picture.view.start;
-        return Err(Failure::new(format!("--start {start}: {path} has no frame there")));
+        let end = picture.end.map_or(String::new(), |end| format!(" --end {end}"));
+        return Err(Failure::new(format!("--start {start}{end}: {path} has no frame there")));
     }
     if panels.len() > MAX_PANELS {
         return Err(Failure::new(format!(

@@ -115,16 +115,25 @@ impl Machine<'_> {
         }
     }
 
-    /// Has the memo hold what the list or dictionary on top of the stack is now.
-    fn grow(&mut self) -> Result<(), String> {
+    /// Adds to the memo's copy of the list or dictionary on top of the stack what is added to that.
+    fn grow(&mut self, items: &[Value]) -> Result<(), String> {
         self.forget_popped();
-        let (Some(&(place, index)), Some(value)) = (self.growing.last(), self.stack.last()) else {
-            return Ok(());
-        };
-        if place + 1 == self.stack.len() {
-            let value = value.clone();
-            self.count(&value)?;
-            self.memo[index] = value;
+        let Some(top) = self.stack.len().checked_sub(1) else { return Ok(()) };
+        for at in (0..self.growing.len()).rev() {
+            let (place, index) = self.growing[at];
+            if place != top {
+                break;
+            }
+            items.iter().try_for_each(|item| self.count(item))?;
+            match &mut self.memo[index] {
+                Value::List(list) => list.extend_from_slice(items),
+                Value::Dict(dict) => {
+                    dict.extend(
+                        items.chunks_exact(2).map(|pair| (pair[0].clone(), pair[1].clone())),
+                    );
+                }
+                _ => (),
+            }
         }
         Ok(())
     }
@@ -215,11 +224,13 @@ impl Machine<'_> {
             b'a' | b'e' => {
                 let items = if code == b'a' { vec![self.pop()?] } else { self.since_mark()? };
                 let items = shallow(items)?;
-                match self.stack.last_mut() {
-                    Some(Value::List(list)) => list.extend(items),
-                    _ => return Err("a value is appended to something that is not a list".into()),
+                if !matches!(self.stack.last(), Some(Value::List(_))) {
+                    return Err("a value is appended to something that is not a list".into());
                 }
-                self.grow()?;
+                self.grow(&items)?;
+                if let Some(Value::List(list)) = self.stack.last_mut() {
+                    list.extend(items);
+                }
             }
             b's' | b'u' => {
                 let items = if code == b's' {
@@ -229,14 +240,16 @@ impl Machine<'_> {
                     self.since_mark()?
                 };
                 let items = shallow(items)?;
-                let Some(Value::Dict(dict)) = self.stack.last_mut() else {
+                if !matches!(self.stack.last(), Some(Value::Dict(_))) {
                     return Err("a value is set in something that is not a dictionary".into());
-                };
-                let mut items = items.into_iter();
-                while let (Some(key), Some(value)) = (items.next(), items.next()) {
-                    dict.push((key, value));
                 }
-                self.grow()?;
+                self.grow(&items)?;
+                if let Some(Value::Dict(dict)) = self.stack.last_mut() {
+                    let mut items = items.into_iter();
+                    while let (Some(key), Some(value)) = (items.next(), items.next()) {
+                        dict.push((key, value));
+                    }
+                }
             }
             b'c' => {
                 let (module, name) = (self.line()?, self.line()?);
@@ -313,6 +326,18 @@ mod tests {
         let key = |name: &str| Value::Text(name.into());
         let both = vec![(key("a"), list.clone()), (key("b"), list)];
         assert_eq!(read(shared).unwrap(), Value::Dict(both));
+        // In batches, as long lists are written.
+        let batches = b"\x80\x02(]q\0q\x01(K\x05e(K\x06eh\0h\x01t.";
+        let list = Value::List(vec![Value::Int(5), Value::Int(6)]);
+        assert_eq!(read(batches).unwrap(), Value::Tuple(vec![list; 3]));
+        let mut long = b"\x80\x02]q\0".to_vec();
+        for _ in 0..200 {
+            long.extend(b"(");
+            long.extend(b"K\x05".repeat(1000));
+            long.extend(b"e");
+        }
+        long.extend(b".");
+        assert!(matches!(read(&long), Ok(Value::List(list)) if list.len() == 200_000));
         // A list in the place of one that was dropped is not that one: [dropped, [7]]
         let dropped = b"\x80\x02(]q\x000]K\x07ah\x00t.";
         let seven = Value::List(vec![Value::Int(7)]);
