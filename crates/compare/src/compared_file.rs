@@ -9,7 +9,7 @@ use corsmal_files::npz::{NpzError, NpzFile};
 use corsmal_files::parquet::{NumericTable, ParquetFile};
 use corsmal_files::provenance::Provenance;
 use corsmal_files::table::{RESERVED, Table};
-use ndarray::{Array1, ArrayD, Axis};
+use ndarray::{Array1, ArrayD};
 use serde::Serialize;
 
 use super::pairing::Identities;
@@ -251,29 +251,9 @@ impl ComparedFile {
     /// Makes columns of whole numbers texts where those of the other file are texts, as doubles would
     /// round them.
     pub(super) fn spell_out(&mut self, other: &Self) {
-        let Some(table) = &mut self.table else { return };
-        let is_whole = |text: &String| text.is_empty() || text.parse::<i128>().is_ok();
-        let is_text = |at: usize| {
-            let mut theirs = other.texts.iter().filter(|text| text.name == table.names[at]);
-            theirs.any(|text| text.values.iter().all(is_whole))
-                && table.values.column(at).iter().all(|x| x.is_nan() || x.fract() == 0.0)
-        };
-        let (texts, kept): (Vec<usize>, Vec<usize>) =
-            (0..table.names.len()).partition(|&i| is_text(i));
-        for &at in &texts {
-            let spelled =
-                |x: &f64| if x.is_nan() { String::new() } else { format!("{:.0}", x + 0.0) };
-            let values: Vec<String> = table.values.column(at).iter().map(spelled).collect();
-            self.texts.push(TextColumn {
-                name: table.names[at].clone(),
-                ids: table.ids.clone(),
-                shape: vec![values.len() as u64],
-                values,
-            });
+        if let Some(table) = &mut self.table {
+            self.texts.extend(texts::spelled_out(table, &other.texts));
         }
-        table.values = table.values.select(Axis(1), &kept);
-        table.names = kept.iter().map(|&i| table.names[i].clone()).collect();
-        table.types = kept.iter().map(|&i| table.types[i]).collect();
     }
 
     /// Whether it is a table of texts only, of which the other has some.

@@ -3,7 +3,9 @@
 use std::collections::{HashMap, HashSet};
 use std::hash::Hash;
 
+use corsmal_files::parquet::NumericTable;
 use corsmal_files::table::Table;
+use ndarray::Axis;
 use serde::Serialize;
 
 use super::pairing::{Identities, PairedBy};
@@ -67,6 +69,30 @@ pub(super) fn of_table(table: &Table) -> Vec<TextColumn> {
         values: outcomes.iter().map(|outcome| outcome.status.name().to_owned()).collect(),
     };
     labels.chain([statuses]).collect()
+}
+
+/// Takes the columns of whole numbers from a table that are texts in the other file.
+pub(super) fn spelled_out(table: &mut NumericTable, other: &[TextColumn]) -> Vec<TextColumn> {
+    let is_whole = |text: &String| text.is_empty() || text.parse::<i128>().is_ok();
+    let is_text = |at: usize| {
+        let mut theirs = other.iter().filter(|text| text.name == table.names[at]);
+        theirs.any(|text| text.values.iter().all(is_whole))
+            && table.values.column(at).iter().all(|x| x.is_nan() || x.fract() == 0.0)
+    };
+    let (texts, kept): (Vec<usize>, Vec<usize>) =
+        (0..table.names.len()).partition(|&at| is_text(at));
+    let spelled = |x: &f64| if x.is_nan() { String::new() } else { format!("{:.0}", x + 0.0) };
+    let column = |at: usize| TextColumn {
+        name: table.names[at].clone(),
+        ids: table.ids.clone(),
+        shape: vec![table.values.nrows() as u64],
+        values: table.values.column(at).iter().map(spelled).collect(),
+    };
+    let found = texts.into_iter().map(column).collect();
+    table.values = table.values.select(Axis(1), &kept);
+    table.names = kept.iter().map(|&at| table.names[at].clone()).collect();
+    table.types = kept.iter().map(|&at| table.types[at]).collect();
+    found
 }
 
 /// Compares the columns that both files have, in the rows that both have.

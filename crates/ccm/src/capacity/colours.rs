@@ -2,7 +2,9 @@
 
 use corsmal_vision::{Detection, Pictures, Rgb, Video};
 
-use super::views::{Frame, Kind, Problem, Views};
+use super::frames::{Frame, Kind};
+use super::problem::Problem;
+use super::views::Views;
 use crate::dataset::Recording;
 use crate::error::{CcmError, Result};
 

@@ -9,7 +9,9 @@ use corsmal_vision::lode::{self, Variant, View};
 use corsmal_vision::region::{self, Region};
 use corsmal_vision::{Camera, Depth, Detection, Mask};
 
-use super::views::{IMAGE_SIZE, Kind, Problem, Views};
+use super::frames::Kind;
+use super::problem::Problem;
+use super::views::{IMAGE_SIZE, Views};
 
 /// Labels that M5 takes for a container.
 const M5_LABELS: [&str; 5] = ["bottle", "wine glass", "cup", "book", "vase"];

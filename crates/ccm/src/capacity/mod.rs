@@ -4,9 +4,11 @@
 
 mod colours;
 mod combine;
+mod frames;
 mod methods;
 mod model;
 mod options;
+mod problem;
 mod regions;
 mod table;
 mod tables;
@@ -23,14 +25,16 @@ use crate::submission::RowKey;
 
 pub use colours::{Colours, Reader, doubtful_colours, require_colours};
 pub use combine::combine_files;
+pub use frames::{Frame, Kind};
 pub use methods::{Estimate, M5_FROM_END, RegionNetwork, Sizes};
 use model::Sample;
 pub use model::{CapacityModel, HeldOut};
 pub use options::{CapacityOptions, Method};
+pub use problem::Problem;
 pub use regions::{LabelledRegion, Regions, regions};
 pub use table::{Measured, PRIOR_MASS_G, Row, read, write};
 pub(crate) use tables::require_own_tables;
-pub use views::{Frame, Kind, Problem, Views};
+pub use views::Views;
 
 /// Estimates every recording of a data set, in its order. `progress` hears how many are done.
 ///

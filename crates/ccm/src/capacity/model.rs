@@ -10,7 +10,7 @@ use corsmal_vision::{GaussianProcess, Normal};
 use serde::{Deserialize, Serialize};
 
 use super::methods::{Estimate, region_sizes};
-use super::views::Problem;
+use super::problem::Problem;
 use crate::error::{CcmError, Result};
 
 /// Version of the file format.

@@ -5,7 +5,8 @@ use std::sync::atomic::AtomicBool;
 use corsmal_vision::region::Region;
 use serde_json::{Value, json};
 
-use super::views::{Problem, Views};
+use super::problem::Problem;
+use super::views::Views;
 use super::{CapacityOptions, each, key, labelled, methods, require_own_tables, training};
 use crate::dataset::DataSet;
 use crate::error::{CcmError, Result};

@@ -7,7 +7,7 @@ use corsmal_files::draft;
 
 use super::methods::Estimate;
 use super::options::CapacityOptions;
-use super::views::Problem;
+use super::problem::Problem;
 use crate::dataset::{Dimensions, Subset};
 use crate::error::{CcmError, Result};
 use crate::predictions::{Named, read_capacities, row_name};

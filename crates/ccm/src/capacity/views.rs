@@ -9,17 +9,15 @@
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use corsmal_vision::{
-    Calibration, Camera, Depth, Detection, Mask, Video, VisionError, read_detections,
-};
+use corsmal_vision::{Calibration, Camera, Depth, Detection, Mask, Video, read_detections};
 
 use super::colours::Colours;
+use super::frames::{self, Frame, Kind};
+use super::problem::Problem;
 use crate::dataset::Recording;
 
 /// Columns and rows of the data set's images.
 pub(super) const IMAGE_SIZE: (usize, usize) = (1280, 720);
-/// Frames that are listed of one view at most.
-const MAX_FRAMES: usize = 100_000;
 
 /// Where the files of a recording's views are.
 #[derive(Clone, Debug)]
@@ -40,56 +38,6 @@ pub struct Views {
 
 /// The frames of a kind and view, listed when they are first asked for.
 type Listing = OnceLock<Result<Vec<Frame>, Problem>>;
-
-/// Kinds of images of a view.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// Depth in mm.
-    Depth,
-    /// Colour.
-    Rgb,
-    /// Which pixels show the container.
-    Masks,
-}
-
-impl Kind {
-    /// Name of its folder.
-    fn folder(self) -> &'static str {
-        match self {
-            Self::Depth => "depth",
-            Self::Rgb => "rgb",
-            Self::Masks => "masks",
-        }
-    }
-}
-
-/// A frame of a view.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Frame {
-    /// Its number in the video, from 0.
-    pub number: u32,
-    /// The image.
-    pub path: PathBuf,
-}
-
-/// Why something could not be used.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Problem {
-    /// It is not there, or shows nothing to measure.
-    Missing(String),
-    /// It is there but damaged, or contradicts another file.
-    Damaged(String),
-}
-
-impl From<VisionError> for Problem {
-    fn from(error: VisionError) -> Self {
-        match error {
-            VisionError::Request(reason) => Self::Missing(reason),
-            // Inputs that contradict each other, and files that cannot be read.
-            other => Self::Damaged(other.to_string()),
-        }
-    }
-}
 
 impl Views {
     /// The views of a recording; `detections` is a folder of tables, with sub-folders by container (by part,
@@ -163,32 +111,8 @@ impl Views {
             base.join(format!("{kind}/{stem}/c{view}")),
             base.join(format!("view{view}/{kind}/{stem}")),
         ];
-        let Some(folder) = folders.iter().find(|folder| folder.is_dir()) else {
-            return Ok(Vec::new());
-        };
-        let unreadable = |e| Problem::Damaged(format!("{}: {e}", folder.display()));
-        let mut frames = Vec::new();
-        for entry in std::fs::read_dir(folder).map_err(unreadable)? {
-            let path = entry.map_err(unreadable)?.path();
-            let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-            let image = matches!(extension.as_deref(), Some("png" | "jpg" | "jpeg"));
-            let number = path.file_stem().and_then(|s| s.to_string_lossy().parse().ok());
-            if let (true, Some(number)) = (image, number) {
-                frames.push(Frame { number, path });
-            }
-            if frames.len() > MAX_FRAMES {
-                let folder = folder.display();
-                return Err(Problem::Damaged(format!("{folder}: more than {MAX_FRAMES} frames")));
-            }
-        }
-        frames.sort_by(|a, b| (a.number, &a.path).cmp(&(b.number, &b.path)));
-        match frames.windows(2).find(|pair| pair[0].number == pair[1].number) {
-            None => Ok(frames),
-            Some(pair) => {
-                let [one, other] = [&pair[0], &pair[1]].map(|frame| frame.path.display());
-                Err(Problem::Damaged(format!("{one} and {other} are images of the same frame")))
-            }
-        }
+        let found = folders.iter().find(|folder| folder.is_dir());
+        found.map_or(Ok(Vec::new()), |folder| frames::list(folder))
     }
 
     /// The video of a view, where there is one. Its index is read once.
