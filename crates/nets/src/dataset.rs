@@ -200,7 +200,7 @@ pub fn require_names<'a>(
         None => Ok(()),
         Some(name) => {
             let reason = format!(
-                "a label column is called {name}, as the file's own member: rename the column"
+                "a label column is called {name}, like a member of the file: rename the column"
             );
             Err(ItemsError::Content { path: path.display().to_string(), reason })
         }

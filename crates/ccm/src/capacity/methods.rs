@@ -214,7 +214,7 @@ pub(super) fn m2_region(views: &Views, variant: Variant) -> Result<Region, Probl
     let looked = frames.len() - first;
     Err(Problem::Missing(match looked {
         0 if !frames.is_empty() => {
-            "only one depth image of view 3, which the published program passes over".into()
+            "only one depth image of view 3, which the published program skips".into()
         }
         0 => "no depth image of view 3".into(),
         n => format!("no object is near and large enough in the last {n} depth images of view 3"),

@@ -271,7 +271,7 @@ impl Finished<'_> {
                 changed.is_empty() || changed.iter().any(|outcome| !outcome.identity.is_empty());
             return Err(refuse(match were_read {
                 true => "holds features of files that have changed since",
-                false => "has failures of files that can be read now",
+                false => "has failures for files that can be read now",
             }));
         }
         Ok(RunReport { resumed: outcomes.len(), outcomes, up_to_date: true })

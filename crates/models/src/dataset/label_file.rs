@@ -209,8 +209,8 @@ impl LabelFile {
         Ok((columns, unmatched))
     }
 
-    /// By id, that of the recording for windows; by path as extracted or, failing that, the path without extension as id; by any of
-    /// these or the file name where the column has another name.
+    /// By id (for windows, also that of their recording); by path as extracted or, failing that, the path
+    /// without extension as id; by any of these or the file name where the column has another name.
     fn find(&self, (id, path): (&str, &str)) -> Option<(&String, &Line)> {
         let get = |key: &str| self.rows.get_key_value(key);
         let of_window = || recording_of((id, path)).and_then(get);

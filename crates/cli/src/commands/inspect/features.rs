@@ -112,6 +112,9 @@ fn draw_frames(
     panels.retain(|panel| panel.values.ncols() > 0);
     if panels.is_empty() {
         let start = picture.view.start;
+        if start == 0.0 && picture.end.is_none() {
+            return Err(nothing(&path));
+        }
         let end = picture.end.map_or(String::new(), |end| format!(" --end {end}"));
         return Err(Failure::new(format!("--start {start}{end}: {path} has no frame there")));
     }
