@@ -68,34 +68,31 @@ pub trait Layer: Debug + Send + Sync {
 /// Layers one after another.
 pub type Chain = Vec<Box<dyn Layer>>;
 
+/// Each layer with the shape that reaches it.
+fn with_inputs(
+    layers: &[Box<dyn Layer>],
+    input: Shape,
+) -> impl Iterator<Item = (&dyn Layer, Shape)> {
+    layers.iter().scan(input, |shape, layer| {
+        let before = *shape;
+        *shape = layer.output(before).unwrap_or(before);
+        Some((layer.as_ref(), before))
+    })
+}
+
 /// Items that a training step needs at least on account of these layers.
 pub(crate) fn fewest_for(layers: &[Box<dyn Layer>], input: Shape) -> usize {
-    let (mut shape, mut most) = (input, 1);
-    for layer in layers {
-        most = most.max(layer.fewest_items(shape));
-        shape = layer.output(shape).unwrap_or(shape);
-    }
-    most
+    with_inputs(layers, input).map(|(layer, shape)| layer.fewest_items(shape)).max().unwrap_or(1)
 }
 
 /// Numbers that a training step holds for each item on account of these layers; see [`Layer::kept`].
 pub(crate) fn kept_by(layers: &[Box<dyn Layer>], input: Shape) -> usize {
-    let (mut shape, mut sum) = (input, 0);
-    for layer in layers {
-        sum += layer.kept(shape);
-        shape = layer.output(shape).unwrap_or(shape);
-    }
-    sum
+    with_inputs(layers, input).map(|(layer, shape)| layer.kept(shape)).sum()
 }
 
 /// Numbers that evaluation holds for each item while the largest of these layers works; see [`Layer::passing`].
 pub(crate) fn passing_by(layers: &[Box<dyn Layer>], input: Shape) -> usize {
-    let (mut shape, mut most) = (input, 0);
-    for layer in layers {
-        most = most.max(layer.passing(shape));
-        shape = layer.output(shape).unwrap_or(shape);
-    }
-    most
+    with_inputs(layers, input).map(|(layer, shape)| layer.passing(shape)).max().unwrap_or(0)
 }
 
 /// A way through the network.
