@@ -17,7 +17,7 @@ use corsmal_files::quote::{printable, quoted, shown};
 use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, Visitor};
 use serde_json::Value;
 
-use crate::inputs::InputError;
+use crate::inputs::error::InputError;
 
 /// File name extensions of manifests, lower case.
 pub const EXTENSIONS: [&str; 3] = ["csv", "jsonl", "ndjson"];

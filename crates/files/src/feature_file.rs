@@ -9,7 +9,7 @@ use crate::layout::{self, LayoutError};
 use crate::npy::NpyFile;
 use crate::npz::{NpzError, NpzFile};
 use crate::parquet::{ParquetFile, ParquetTableError};
-use crate::partition;
+use crate::partition::names::is_partitioned;
 use crate::provenance::Provenance;
 use crate::table::Table;
 
@@ -110,7 +110,7 @@ impl FeatureFile {
     /// # Errors
     /// [`FeatureFileError`].
     pub fn open(path: &Path) -> Result<Self, FeatureFileError> {
-        if partition::is_partitioned(path) {
+        if is_partitioned(path) {
             return Err(FeatureFileError::Parts { path: path.into() });
         }
         if path.is_dir() {

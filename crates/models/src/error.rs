@@ -126,15 +126,16 @@ pub enum ModelError {
         /// classes among them
         classes: usize,
     },
-    /// More different classes than [`crate::labels::MAX_CLASSES`].
+    /// More different classes than are learned and scored.
     #[error(
-        "{classes} different classes, but at most {} are learned and scored; does the column have \
-         ids or numbers? `score --numeric` measures estimates of numbers",
-        crate::labels::MAX_CLASSES
+        "{classes} different classes, but at most {most} are learned and scored; does the column have \
+         ids or numbers? `score --numeric` measures estimates of numbers"
     )]
     TooManyClasses {
         /// how many
         classes: usize,
+        /// as many as are allowed
+        most: usize,
     },
     /// A class with fewer rows than asked for.
     #[error("class {class} has {rows} rows; {purpose} needs {needed}")]

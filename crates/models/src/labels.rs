@@ -13,7 +13,10 @@ pub const MAX_CLASSES: usize = 4096;
 
 /// Refuses more than [`MAX_CLASSES`].
 pub(crate) fn require_few(classes: usize) -> Result<()> {
-    if classes > MAX_CLASSES { Err(ModelError::TooManyClasses { classes }) } else { Ok(()) }
+    if classes > MAX_CLASSES {
+        return Err(ModelError::TooManyClasses { classes, most: MAX_CLASSES });
+    }
+    Ok(())
 }
 
 /// The names of the classes; a class index is a position in it.

@@ -3,6 +3,7 @@
 use super::added::Placed;
 use super::baselines::Variant;
 use super::interval::bootstrap;
+use super::names::file_name;
 use super::predicted::Predicted;
 use super::results::{Estimate, PartScores, Rows, Target, score};
 use crate::capacity::PRIOR_MASS_G;
@@ -312,12 +313,6 @@ impl Method {
             tests,
         })
     }
-}
-
-/// A name as a part of file names.
-pub(super) fn file_name(name: &str) -> String {
-    let words = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty());
-    words.map(str::to_ascii_lowercase).collect::<Vec<_>>().join("-")
 }
 
 pub(super) fn level_names() -> Vec<String> {

@@ -10,6 +10,7 @@ mod interval;
 mod made;
 mod matrix;
 mod method;
+mod names;
 mod predicted;
 mod protocols;
 mod remaining;
@@ -38,6 +39,7 @@ use crate::dataset::{Container, DataSet, Subset};
 use crate::error::{CcmError, Result};
 use baselines::BaselineResult;
 use matrix::{Matrices, Store};
+use names::file_name;
 use predicted::Predicted;
 use protocols::{Setting, Unit};
 use results::Rows;
@@ -225,7 +227,7 @@ fn require_names(options: &BenchmarkOptions) -> Result<()> {
     };
     let mut seen = HashMap::new();
     for name in added.clone().chain(capacities) {
-        let file = method::file_name(name);
+        let file = file_name(name);
         if file.is_empty() {
             return Err(CcmError::Request(format!(
                 "{name}: files are named after it, so it must contain a letter (a to z) or a digit"
@@ -237,8 +239,8 @@ fn require_names(options: &BenchmarkOptions) -> Result<()> {
     }
     for name in added {
         let mut systems = options.systems.iter().map(|system| system.name());
-        let file = method::file_name(name);
-        if let Some(system) = systems.find(|system| method::file_name(system) == file) {
+        let file = file_name(name);
+        if let Some(system) = systems.find(|system| file_name(system) == file) {
             return same(name, system);
         }
     }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::matrix::inputs;
-use super::method::file_name;
+use super::names::file_name;
 use super::protocols::container_folds;
 use super::results::{Estimate, Rows};
 use crate::capacity::Views;

@@ -2,6 +2,7 @@
 //!
 //! `docs/vision.md` says what is published, what is corrected and what is our reading.
 
+mod checks;
 mod colours;
 mod combine;
 mod frames;
@@ -10,8 +11,8 @@ mod model;
 mod options;
 mod problem;
 mod regions;
+mod seen;
 mod table;
-mod tables;
 mod views;
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -23,7 +24,9 @@ use crate::dataset::{Container, DataSet, Recording, Subset};
 use crate::error::{CcmError, Result};
 use crate::submission::RowKey;
 
-pub use colours::{Colours, Reader, doubtful_colours, require_colours};
+pub(crate) use checks::require_own_tables;
+pub use checks::{doubtful_colours, require_colours};
+pub use colours::{Colours, Reader};
 pub use combine::combine_files;
 pub use frames::{Frame, Kind};
 pub use methods::{Estimate, M5_FROM_END, RegionNetwork, Sizes};
@@ -33,7 +36,6 @@ pub use options::{CapacityOptions, Method};
 pub use problem::Problem;
 pub use regions::{LabelledRegion, Regions, regions};
 pub use table::{Measured, PRIOR_MASS_G, Row, read, write};
-pub(crate) use tables::require_own_tables;
 pub use views::Views;
 
 /// Estimates every recording of a data set, in its order. `progress` hears how many are done.

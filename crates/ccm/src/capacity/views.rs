@@ -9,7 +9,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use corsmal_vision::{Calibration, Camera, Depth, Detection, Mask, Video, read_detections};
+use corsmal_vision::{Calibration, Camera, Depth, Video};
 
 use super::colours::Colours;
 use super::frames::{self, Frame, Kind};
@@ -18,6 +18,9 @@ use crate::dataset::Recording;
 
 /// Columns and rows of the data set's images.
 pub(super) const IMAGE_SIZE: (usize, usize) = (1280, 720);
+
+/// Views of a recording.
+pub(super) const VIEWS: std::ops::RangeInclusive<u8> = 1..=4;
 
 /// Where the files of a recording's views are.
 #[derive(Clone, Debug)]
@@ -99,7 +102,7 @@ impl Views {
     }
 
     /// The image of a kind that shows a frame of a view.
-    fn image(&self, kind: Kind, view: u8, frame: u32) -> Result<Option<&Path>, Problem> {
+    pub(super) fn image(&self, kind: Kind, view: u8, frame: u32) -> Result<Option<&Path>, Problem> {
         let frames = self.frames(kind, view)?;
         let at = frames.partition_point(|f| f.number < frame);
         Ok(frames.get(at).filter(|f| f.number == frame).map(|f| f.path.as_path()))
@@ -158,34 +161,6 @@ impl Views {
         tables.into_iter().find(|path| path.is_file())
     }
 
-    /// What a detector saw in all views; `None` where there is no table.
-    ///
-    /// # Errors
-    /// The table is damaged, or about frames that a video does not have.
-    pub fn detections(&self) -> Result<Option<Vec<Detection>>, Problem> {
-        let Some(path) = self.table() else { return Ok(None) };
-        let detections = read_detections(&path)?;
-        self.require_frames(&detections)
-            .map_err(|reason| Problem::Damaged(format!("{}: {reason}", path.display())))?;
-        Ok(Some(detections))
-    }
-
-    /// Whether something says where the object is in a frame of a view, as [`Views::edges`] finds it.
-    ///
-    /// # Errors
-    /// Nothing does.
-    pub fn shows(
-        &self,
-        detections: &[Detection],
-        (view, frame): (u8, u32),
-        labels: &[&str],
-    ) -> Result<(), Problem> {
-        match self.image(Kind::Masks, view, frame)? {
-            Some(_) => Ok(()),
-            None => best(detections, (view, frame), labels, 0.0).map(|_| ()),
-        }
-    }
-
     /// A depth image of a view.
     ///
     /// # Errors
@@ -198,93 +173,6 @@ impl Views {
         check_size((depth.width, depth.height), || path.display().to_string())?;
         Ok(depth)
     }
-
-    /// The object's pixels in a frame: a mask's file, or else the most confident detection among
-    /// `labels` with at least `score`.
-    ///
-    /// # Errors
-    /// There is neither, it is damaged, or of another size than the calibrated images.
-    pub fn mask(
-        &self,
-        detections: &[Detection],
-        (view, frame): (u8, u32),
-        labels: &[&str],
-        score: f64,
-    ) -> Result<Mask, Problem> {
-        if let Some(path) = self.image(Kind::Masks, view, frame)? {
-            let mask = Mask::read(path)?;
-            check_size((mask.width, mask.height), || path.display().to_string())?;
-            return Ok(mask);
-        }
-        let best = best(detections, (view, frame), labels, score)?;
-        let mask = best.mask(Some(IMAGE_SIZE))?.ok_or_else(|| {
-            Problem::Missing(format!("view {view}, frame {frame}: the detection has no mask"))
-        })?;
-        check_size((mask.width, mask.height), || {
-            format!("the detection in view {view}, frame {frame}")
-        })?;
-        Ok(mask)
-    }
-
-    /// Edges of the object in a colour image of `size`, first column and row and those after the last: of
-    /// its mask, where there is one, else of the detector's box. Where it is, is as [`Views::mask`] finds it.
-    ///
-    /// # Errors
-    /// There is neither, it is damaged, or its mask is of another size.
-    pub fn edges(
-        &self,
-        detections: &[Detection],
-        (view, frame): (u8, u32),
-        labels: &[&str],
-        size: (usize, usize),
-    ) -> Result<[usize; 4], Problem> {
-        let (mask, boxed) = match self.image(Kind::Masks, view, frame)? {
-            Some(path) => (Some(Mask::read(path)?), None),
-            None => {
-                let best = best(detections, (view, frame), labels, 0.0)?;
-                (best.mask(Some(size))?, Some(best.bounds))
-            }
-        };
-        let edges = match (mask, boxed) {
-            (Some(mask), _) if (mask.width, mask.height) != size => {
-                return Err(Problem::Damaged(format!(
-                    "the mask in view {view}, frame {frame}: {} by {} px; its image has {} by {}",
-                    mask.width, mask.height, size.0, size.1
-                )));
-            }
-            (Some(mask), _) => mask.bounds(),
-            (None, boxed) => boxed.map(|[left, top, right, bottom]| {
-                [left.floor(), top.floor(), right.ceil(), bottom.ceil()].map(|v| v as usize)
-            }),
-        };
-        edges.ok_or_else(|| absent(view, frame))
-    }
-
-    /// Numbers of the frames in which every one of `views` has a mask or a detection.
-    ///
-    /// # Errors
-    /// A folder cannot be read.
-    pub fn seen(&self, detections: &[Detection], views: &[u8]) -> Result<Vec<u32>, Problem> {
-        let mut common: Option<Vec<u32>> = None;
-        for &view in views {
-            let mut numbers: Vec<u32> = detections
-                .iter()
-                .filter(|d| d.view == view)
-                .map(|d| d.frame)
-                .chain(self.frames(Kind::Masks, view)?.iter().map(|f| f.number))
-                .collect();
-            numbers.sort_unstable();
-            numbers.dedup();
-            common = Some(match common {
-                None => numbers,
-                Some(mut all) => {
-                    all.retain(|n| numbers.binary_search(n).is_ok());
-                    all
-                }
-            });
-        }
-        Ok(common.unwrap_or_default())
-    }
 }
 
 /// What there is of a view, 1 to 4.
@@ -293,29 +181,9 @@ fn of_view<T>(all: &[T; 4], view: u8) -> Result<&T, Problem> {
     place.ok_or_else(|| Problem::Missing(format!("no view {view}; views are 1 to 4")))
 }
 
-/// The most confident detection among `labels` in a frame with at least `score`, of equals the first, as
-/// detectors list them.
-fn best<'d>(
-    detections: &'d [Detection],
-    (view, frame): (u8, u32),
-    labels: &[&str],
-    score: f64,
-) -> Result<&'d Detection, Problem> {
-    let of_frame = detections
-        .iter()
-        .filter(|d| d.view == view && d.frame == frame && d.score >= score)
-        .filter(|d| labels.contains(&d.label.as_str()));
-    let best = of_frame.reduce(|best, d| if d.score > best.score { d } else { best });
-    best.ok_or_else(|| absent(view, frame))
-}
-
-fn absent(view: u8, frame: u32) -> Problem {
-    Problem::Missing(format!("no container in view {view}, frame {frame}"))
-}
-
 /// Masks and depth images must be as large as what the calibration belongs to: measures on others are as wrong
 /// as their scale.
-fn check_size(size: (usize, usize), what: impl Fn() -> String) -> Result<(), Problem> {
+pub(super) fn check_size(size: (usize, usize), what: impl Fn() -> String) -> Result<(), Problem> {
     if size == IMAGE_SIZE {
         return Ok(());
     }

@@ -8,7 +8,7 @@ use super::files::{self, NOTICE};
 use super::objects::capacity_ml;
 use super::take::{Size, Take, generator, plan};
 use super::views::write_views;
-use super::{array, physics};
+use super::{annotations, array, physics};
 use crate::dataset::Subset;
 use crate::error::{CcmError, Result};
 
@@ -53,7 +53,7 @@ fn make(dir: &Path, size: Size, seed: u64, vision: bool) -> Result<Summary> {
     files::write_notice(dir, size, seed, vision)?;
     let mut takes = plan(size, seed);
     takes.par_iter_mut().try_for_each(|take| record(take, dir, seed, vision))?;
-    files::write_annotations(dir, &takes)?;
+    annotations::write_annotations(dir, &takes)?;
     Ok(Summary { recordings: takes.len(), frames: takes.iter().map(|t| t.frames as u64).sum() })
 }
 

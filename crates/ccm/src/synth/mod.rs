@@ -2,6 +2,7 @@
 //!
 //! For demonstration and tests only: scores on them mean nothing about the real data set.
 
+mod annotations;
 mod array;
 mod files;
 mod generate;

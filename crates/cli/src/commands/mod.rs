@@ -4,8 +4,6 @@ mod benchmark;
 mod capacity;
 mod classifiers;
 mod classify;
-#[cfg(all(feature = "nets", feature = "onnx"))]
-mod clips;
 mod compare;
 mod compare_predictions;
 mod completions;

@@ -10,6 +10,7 @@ mod check;
 mod converter;
 mod design;
 mod dot;
+mod frames;
 mod kaiser;
 mod kernel;
 mod low_pass;
@@ -28,7 +29,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Result, from_name};
 use check::{check_interleaved, check_rates};
-use stage::{Frames, Stage};
+use frames::Frames;
+use stage::Stage;
 
 pub(crate) use array::{before_last, resample_last};
 pub use array::{resample, resample_into, resampled_len};

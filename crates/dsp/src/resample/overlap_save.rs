@@ -5,8 +5,8 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::common;
+use super::frames::Frames;
 use super::poly::Poly;
-use super::stage::Frames;
 use crate::lanes::{Change, Convolution, LANES, Row, Slots, gather_part};
 use crate::pool::Pool;
 

@@ -7,7 +7,7 @@ use pulp::{Arch, Simd, WithSimd};
 use super::common;
 use super::design::PolyDesign;
 use super::dot::{BLOCK, dot};
-use super::stage::Frames;
+use super::frames::Frames;
 use super::strided::strided;
 use crate::lanes::{Lanes, Row};
 

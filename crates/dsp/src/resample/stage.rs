@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use super::design::Design;
+use super::frames::Frames;
 use super::kernel::{Correlate, Plane, SPAN, dispatch};
 use super::overlap_save::OverlapSave;
 use super::poly::Poly;
@@ -18,13 +19,6 @@ pub(super) enum Stage {
     Long(OverlapSave),
     /// Tabulated interpolator.
     Poly(Poly),
-}
-
-/// Interleaved frames with the absolute number of the first one.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Frames<'a> {
-    pub data: &'a [f32],
-    pub start: i64,
 }
 
 impl Stage {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::ResamplePlan;
 use super::check::check_interleaved;
-use super::stage::Frames;
+use super::frames::Frames;
 use crate::error::Result;
 
 /// Converts interleaved frames as they come; the outputs do not depend on how the input is cut into

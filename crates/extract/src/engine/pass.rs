@@ -11,46 +11,12 @@ use super::extractor::{Extractor, Span};
 use super::failed::Failed;
 use super::held::Held;
 use super::plans::Planned;
-use super::reading::{BLOCK, check_samples, unread};
+use super::samples::{BLOCK, check_samples};
 use super::signal_chain::SignalChain;
+use super::stretch::Stretch;
 
 /// Values computed of a span before they are handed on (8 MiB).
 const PART: usize = 1 << 21;
-
-/// Frames of a recording that are read, and those of them that belong to the span.
-#[derive(Debug, Clone, PartialEq)]
-struct Stretch {
-    read: Range<u64>,
-    own: Range<u64>,
-    /// Number of the first in the signal.
-    first: u64,
-    /// Frames of the span that are passed without a look.
-    passed: u64,
-}
-
-impl Stretch {
-    fn of(
-        source: &dyn BlockSource,
-        planned: &Planned,
-        (crop, span): (&Range<u64>, &Range<u64>),
-    ) -> Self {
-        // Padding by reflection may reach back twice the padding of a frame; one more is for what looks at
-        // the sample before.
-        let (before, after) = planned.plan.context();
-        let passed = unread(source, planned, crop, span);
-        let first = span.start.saturating_sub(2 * before as u64 + 1) + passed;
-        let begin = crop.start.saturating_add(first);
-        let end = crop.end.min(crop.start.saturating_add(span.end.saturating_add(after as u64)));
-        let own = crop.start.saturating_add(span.start)..crop.start.saturating_add(span.end);
-        Self { read: begin..end, own, first, passed }
-    }
-
-    /// How many of `frames` read from `position` on belong to the span; others are its context.
-    fn owned(&self, position: u64, frames: usize) -> u64 {
-        let end = (position + frames as u64).min(self.own.end);
-        end.saturating_sub(position.max(self.own.start))
-    }
-}
 
 /// A stretch of a recording on its way to features.
 pub struct Pass {

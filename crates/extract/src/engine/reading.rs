@@ -13,17 +13,14 @@ use super::live::Live;
 use super::pass::Pass;
 use super::plans::Planned;
 use super::signal_chain::SignalChain;
+use super::stretch::WHOLE;
 use super::watch::Watch;
 use crate::config::SignalConfig;
 use crate::inputs::stored::Purpose;
 use crate::inputs::{Input, InputSource};
 
-/// Samples read at a time, all channels together.
-pub(super) const BLOCK: usize = 1 << 16;
 /// The repair of a stretch whose end is behind that of its recording.
 const END_BEYOND: &str = "end_beyond_recording";
-/// The span of a signal that is not cut.
-pub const WHOLE: Range<u64> = 0..u64::MAX;
 /// Frames of a recording that is not cut.
 const UNCUT: u64 = 1 << 21;
 /// Frames of a span of one that is: few enough that threads end together.
@@ -130,61 +127,6 @@ pub fn compute(
     let Some(last) = pass.finish(ended, stop, &mut each_of)? else { return Ok(false) };
     last.into_iter().try_for_each(|span| each(span?))?;
     Ok(true)
-}
-
-/// Frames at the beginning of a crop that no feature depends on, and that can be passed without a look:
-/// integers, which are valid whatever they are, each of which has its place in the file.
-pub(super) fn unread(
-    source: &dyn BlockSource,
-    planned: &Planned,
-    crop: &Range<u64>,
-    span: &Range<u64>,
-) -> u64 {
-    let signal = &planned.plan.config.signal;
-    let plain = source.seekable()
-        && source.byte_of(0).is_some()
-        && !source.spec().encoding.may_be_non_finite()
-        && SignalChain::is_local(signal, planned.resample.is_some())
-        && signal.preemphasis == 0.0
-        && *span == WHOLE;
-    match source.most_frames().filter(|_| plain) {
-        Some(most) => planned.plan.unread(most.min(crop.end).saturating_sub(crop.start)),
-        None => 0,
-    }
-}
-
-/// Largest sample that features are computed of: the power of the longest window of such samples
-/// still has a place in single precision.
-pub const LARGEST_SAMPLE: f32 = 1e12;
-
-/// Refuses samples that features cannot be computed of; `position` is that of the first frame, and
-/// `byte_of` knows where in the file a frame begins.
-pub fn check_samples(
-    samples: &[f32],
-    position: u64,
-    channels: usize,
-    byte_of: impl Fn(u64) -> Option<u64>,
-) -> Result<(), Failed> {
-    // False for NaN.
-    let is_usable = |x: &f32| x.abs() <= LARGEST_SAMPLE;
-    if samples.iter().fold(true, |all, x| all & is_usable(x)) {
-        return Ok(());
-    }
-    let at = samples.iter().position(|x| !is_usable(x)).unwrap_or(0);
-    let (frame, channel) = (position + (at / channels) as u64, at % channels);
-    let is_finite = samples[at].is_finite();
-    let bad = samples.iter().filter(|x| !is_usable(x) && x.is_finite() == is_finite).count();
-    let (status, what, why) = match is_finite {
-        true => {
-            (Status::Unsupported, "beyond ±1e12", ": their powers overflow; scale the recording")
-        }
-        false => (Status::NonFinite, "NaN or infinite", ""),
-    };
-    let reason = format!(
-        "{what} from frame {frame} on (channel {channel}; {} of this block){why}",
-        if bad == 1 { "1 sample".into() } else { format!("{bad} samples") }
-    );
-    Err(Failed { byte_offset: byte_of(frame), ..Failed::new(status, reason) })
 }
 
 /// Why a stretch has no samples.

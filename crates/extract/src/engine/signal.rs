@@ -13,6 +13,7 @@ use super::plan::Plan;
 use super::plans::{Planned, Plans};
 use super::reading;
 use super::recording::{Features, Recording};
+use super::samples::check_samples;
 use super::signal_chain::SignalChain;
 use crate::config::Config;
 use corsmal_files::outcome::Status;
@@ -133,7 +134,7 @@ impl Signal {
             let (from, to) = (inside(self.crop.start), inside(self.crop.end));
             let block = &block[from as usize * self.channels..to as usize * self.channels];
             let at = self.origin + begin + from;
-            reading::check_samples(block, at, self.channels, |_| None)?;
+            check_samples(block, at, self.channels, |_| None)?;
             self.front.push(block, &mut self.held);
             self.extractor.push(&self.held);
             self.held.clear();

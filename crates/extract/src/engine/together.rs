@@ -9,8 +9,9 @@ use corsmal_audio::BlockSource;
 use super::failed::Failed;
 use super::pass::Pass;
 use super::plans::Planned;
-use super::reading::{BLOCK, WHOLE};
 use super::recording::Recording;
+use super::samples::BLOCK;
+use super::stretch::WHOLE;
 
 /// What is to be computed of a recording.
 pub struct Wanted {

@@ -5,8 +5,16 @@ use std::path::{Path, PathBuf};
 
 use corsmal_files::quote::quoted;
 
-use super::archive::Entry;
+use super::member::Member;
 use crate::manifest::MAX_CELLS;
+
+/// A recording with what stands beside it.
+pub(super) struct Entry {
+    pub(super) member: Member,
+    /// Name in the archive.
+    pub(super) name: PathBuf,
+    pub(super) labels: Vec<(String, String)>,
+}
 
 /// A member with labels: its name, and what it says.
 pub(super) type Labels = (PathBuf, Vec<(String, String)>);

@@ -10,7 +10,7 @@ use std::sync::atomic::AtomicBool;
 use corsmal_audio::{AudioError, BlockSource};
 use corsmal_files::identity;
 
-use super::archive::{Member, Place};
+use super::member::{Member, Place};
 use super::stored::{self, Object, Pin, Purpose};
 
 /// Where the bytes of a recording come from.

@@ -19,31 +19,32 @@
 mod archive;
 mod beside;
 mod braces;
-mod error;
+mod disk;
+pub(crate) mod error;
 mod folder;
 mod found;
 mod identities;
 mod ids;
 mod input;
+mod member;
 mod objects;
+mod search;
 pub(crate) mod stored;
 mod wildcard;
 
 use std::collections::{BTreeMap, HashSet};
 use std::ffi::OsStr;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::manifest;
-use folder::{has_extension, is_apple_double, walk};
-use found::{Found, Naming};
+use search::{Search, no_audio, told};
 
-pub use archive::{Fault, Member, Place};
 pub use error::InputError;
 pub(crate) use identities::Identities;
 pub use input::{Input, InputSource, list_hash};
+pub use member::{Fault, Member, Place};
 pub use stored::{Object, is_stored, object, require_store, shown};
 
 /// What names stand for.
@@ -98,27 +99,6 @@ impl Collected {
     }
 }
 
-fn told(skipped: &[PathBuf]) -> Option<String> {
-    const SHOWN: usize = 3;
-    let names: Vec<_> = skipped.iter().take(SHOWN).map(|p| p.display().to_string()).collect();
-    let more = if skipped.len() > SHOWN { ", ..." } else { "" };
-    let files = match skipped.len() {
-        0 => return None,
-        1 => "1 file was skipped because its format is".to_string(),
-        n => format!("{n} files were skipped because their formats are"),
-    };
-    Some(format!("{files} not read from folders: {}{more}", names.join(", ")))
-}
-
-/// That nothing at `path` is read, and what is there instead.
-fn no_audio(path: &Path, skipped: &[PathBuf]) -> InputError {
-    let extensions = corsmal_audio::EXTENSIONS.join(", ");
-    let mut skipped = skipped.to_vec();
-    skipped.sort_unstable();
-    let skipped = told(&skipped).map(|told| format!("; {told}")).unwrap_or_default();
-    InputError::NoAudio { path: path.into(), extensions, skipped }
-}
-
 /// Finds the recordings that `names` stand for, in a stable order, with unique ids.
 ///
 /// # Errors
@@ -171,200 +151,4 @@ pub fn collect_until<S: AsRef<OsStr>>(
         }
     });
     Ok(Collected { inputs: inputs.collect(), skipped, unended })
-}
-
-/// A search for recordings: what was found so far.
-struct Search<'a> {
-    found: Vec<Found>,
-    skipped: Vec<PathBuf>,
-    unended: Vec<PathBuf>,
-    stop: &'a Arc<AtomicBool>,
-}
-
-impl<'a> Search<'a> {
-    fn new(stop: &'a Arc<AtomicBool>) -> Self {
-        Self { found: Vec::new(), skipped: Vec::new(), unended: Vec::new(), stop }
-    }
-
-    /// Adds what another search has found.
-    fn append(&mut self, mut other: Self) {
-        self.found.append(&mut other.found);
-        self.skipped.append(&mut other.skipped);
-        self.unended.append(&mut other.unended);
-    }
-
-    fn find(&mut self, name: &OsStr) -> Result<(), InputError> {
-        if name == "-" {
-            let naming = Naming::Given("stdin".into());
-            let (start, end, labels) = (None, None, Vec::new());
-            let line = None;
-            self.found.push(Found { source: InputSource::Stdin, naming, start, end, labels, line });
-            return Ok(());
-        }
-        // The name of an object is never one of a file.
-        if let Some(uri) = name.to_str().filter(|name| is_stored(name)) {
-            return self.find_object(uri);
-        }
-        let path = Path::new(name);
-        match std::fs::metadata(path) {
-            Ok(meta) if meta.is_dir() => {
-                let (mut files, before) = (Vec::new(), self.skipped.len());
-                walk(path, &mut files, &mut self.skipped)?;
-                if files.is_empty() {
-                    return Err(no_audio(path, &self.skipped[before..]));
-                }
-                self.push_sorted(path, files);
-                Ok(())
-            }
-            Ok(_) if is_apple_double(path) => {
-                self.skipped.push(path.into());
-                Ok(())
-            }
-            Ok(_) if has_extension(path, &manifest::EXTENSIONS) => self.find_manifest(path),
-            Ok(_) if archive::is_archive(path) => {
-                self.find_archive(path, &Place::File(path.into()))
-            }
-            Ok(_) => {
-                if let Some(refusal) = archive::refusal(path) {
-                    return Err(refusal);
-                }
-                let relative = path.file_name().map_or_else(|| path.into(), PathBuf::from);
-                self.found.push(Found::file(path.into(), relative));
-                Ok(())
-            }
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                let missing = || InputError::Missing { path: path.into() };
-                let pattern = name.to_str().ok_or_else(missing)?;
-                match braces::expand(pattern)? {
-                    Some(names) => names.iter().try_for_each(|name| self.find(name.as_ref())),
-                    None if wildcard::is_glob(pattern) => self.find_glob(pattern),
-                    None => Err(missing()),
-                }
-            }
-            Err(error) => Err(InputError::io(path, error)),
-        }
-    }
-
-    /// The recordings of an archive; their ids begin with its name.
-    fn find_archive(&mut self, path: &Path, place: &Place) -> Result<(), InputError> {
-        let contents = archive::contents(place, self.stop)?;
-        if contents.recordings.is_empty() {
-            return Err(no_audio(path, &contents.skipped));
-        }
-        let shard = PathBuf::from(path.file_stem().unwrap_or_default());
-        for archive::Entry { member, name, labels } in contents.recordings {
-            if let Some(reason) = ids::label_refusal(&labels) {
-                return Err(InputError::Archive { path: path.into(), reason });
-            }
-            let naming = Naming::Derived(shard.join(name));
-            let source = InputSource::Member(Box::new(member));
-            self.found.push(Found { source, naming, start: None, end: None, labels, line: None });
-        }
-        self.skipped.extend(contents.skipped);
-        if !contents.is_ended {
-            self.unended.push(path.into());
-        }
-        Ok(())
-    }
-
-    fn find_manifest(&mut self, path: &Path) -> Result<(), InputError> {
-        // A manifest beside the wrong folder, or one with files that are gone, is mended before the run.
-        let mut unreadable: Option<(u64, String, usize)> = None;
-        let mut stores = HashSet::new();
-        let entries = manifest::read(path)?;
-        // All rows have the same labels.
-        if let Some(reason) = entries.first().and_then(|e| ids::label_refusal(&e.labels)) {
-            return Err(InputError::Labels { reason: format!("{}: {reason}", path.display()) });
-        }
-        for entry in entries {
-            let wrong =
-                |reason| InputError::Manifest { path: path.into(), line: entry.line, reason };
-            let mut stored = None;
-            if is_stored(&entry.written) {
-                let object = objects::listed(&entry.written, &mut stores, self.stop);
-                stored = Some(object.map_err(|error| wrong(error.to_string()))?);
-            } else {
-                match std::fs::metadata(&entry.path) {
-                    Ok(meta) if meta.is_dir() => {
-                        return Err(wrong(format!("{} is a folder", entry.path.display())));
-                    }
-                    Ok(_) if archive::is_archive(&entry.path) => {
-                        return Err(wrong(format!(
-                            "{} is an archive of recordings: give it as an input, not in a \
-                             manifest",
-                            entry.path.display()
-                        )));
-                    }
-                    Ok(_) if is_apple_double(&entry.path) => {
-                        self.skipped.push(entry.path);
-                        continue;
-                    }
-                    Ok(meta) if !meta.is_file() => {
-                        return Err(wrong(format!(
-                            "{} is a pipe or device, whose bytes come once: give it as an input, not in a manifest",
-                            entry.path.display()
-                        )));
-                    }
-                    Ok(_) => {}
-                    Err(error) => {
-                        let first =
-                            || (entry.line, format!("{}: {error}", entry.path.display()), 0);
-                        unreadable.get_or_insert_with(first).2 += 1;
-                        continue;
-                    }
-                }
-            }
-            if let Some(reason) = entry.id.as_deref().and_then(ids::refusal) {
-                return Err(wrong(reason));
-            }
-            let naming = match (entry.id, &stored) {
-                (Some(id), _) => Naming::Given(id),
-                (None, Some(object)) => Naming::Derived(stored::key(object).into()),
-                (None, None) => Naming::Derived(entry.written.into()),
-            };
-            let source = match stored {
-                Some(object) => InputSource::Object(object.into()),
-                None => InputSource::File(entry.path),
-            };
-            let (start, end, labels) = (entry.start, entry.end, entry.labels);
-            let line = Some(entry.line);
-            self.found.push(Found { source, naming, start, end, labels, line });
-        }
-        let Some((line, mut reason, number)) = unreadable else { return Ok(()) };
-        if number > 1 {
-            reason.push_str(&format!("; {} other lines name such files", number - 1));
-        }
-        Err(InputError::Manifest { path: path.into(), line, reason })
-    }
-
-    fn find_glob(&mut self, pattern: &str) -> Result<(), InputError> {
-        let (mut files, before) = (Vec::new(), self.skipped.len());
-        let (mut archives, paths): (Vec<_>, Vec<_>) = wildcard::expand(pattern)?
-            .into_iter()
-            .partition(|path| archive::is_archive(path) && path.is_file());
-        archives.sort_unstable();
-        for path in &archives {
-            self.find_archive(path, &Place::File(path.clone()))?;
-        }
-        for path in paths {
-            walk(&path, &mut files, &mut self.skipped)?;
-        }
-        if files.is_empty() && archives.is_empty() {
-            return Err(no_audio(Path::new(pattern), &self.skipped[before..]));
-        }
-        self.push_sorted(&wildcard::root(pattern), files);
-        Ok(())
-    }
-
-    fn push_sorted(&mut self, root: &Path, mut files: Vec<PathBuf>) {
-        files.sort_unstable_by(|a, b| {
-            a.as_os_str().as_encoded_bytes().cmp(b.as_os_str().as_encoded_bytes())
-        });
-        // A glob with ** matches a folder and what is in it.
-        files.dedup();
-        for path in files {
-            let relative = path.strip_prefix(root).unwrap_or(&path).to_path_buf();
-            self.found.push(Found::file(path, relative));
-        }
-    }
 }

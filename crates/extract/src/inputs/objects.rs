@@ -10,13 +10,15 @@ use std::sync::atomic::AtomicBool;
 
 use rayon::prelude::*;
 
-use super::archive::{self, Place};
+use super::archive;
 use super::error::InputError;
 use super::folder::has_extension;
 use super::found::{Found, Naming};
 use super::input::InputSource;
+use super::member::Place;
+use super::search::{Search, no_audio};
 use super::stored::{self, Object, object};
-use super::{Search, braces, no_audio, wildcard};
+use super::{braces, wildcard};
 use crate::manifest;
 
 /// Names of a list that are looked for at the same time: of archives all headers are read.

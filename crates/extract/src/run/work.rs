@@ -11,6 +11,7 @@ use corsmal_files::outcome::{Outcome, Status};
 
 use super::output::Member;
 use crate::engine::reading::Part;
+use crate::engine::stretch;
 use crate::engine::together::Wanted;
 use crate::engine::{
     Decoders, Failed, Features, Plan, Planned, Plans, Reader, Recording, Span, Watch, reading,
@@ -109,7 +110,7 @@ pub(super) fn whole(
     let source = reader.source();
     let mut recording = Recording::new(planned.plan.clone(), folder);
     let decoded = &mut outcome.decoded_frames;
-    let span = (&crop, &reading::WHOLE);
+    let span = (&crop, &stretch::WHOLE);
     let computed = reading::compute(source, &planned, span, stop, decoded, |part| {
         recording.add(part).map_err(Failed::temporary)
     });

@@ -1,6 +1,5 @@
 //! An `.npz` or a Parquet table that `extract` did not write, or that another program wrote over.
 
-use std::collections::HashSet;
 use std::path::Path;
 
 use corsmal_files::feature_file::FeatureFileError;
@@ -13,6 +12,7 @@ use ndarray::{Axis, Ix2};
 use serde_json::Value;
 
 use super::error::{DatasetError, Result};
+use super::ids::not_an_id;
 use super::table::LabelledTable;
 
 /// Where features and ids are in a file of another program.
@@ -203,14 +203,4 @@ pub(super) fn read_parquet(
         added: Vec::new(),
         unmatched: None,
     })
-}
-
-/// Why values do not name rows: one is empty, or there twice.
-pub(super) fn not_an_id(ids: &[String]) -> Option<String> {
-    if let Some(row) = ids.iter().position(String::is_empty) {
-        return Some(format!("row {row} has no id"));
-    }
-    let mut seen = HashSet::new();
-    let twice = ids.iter().find(|id| !seen.insert(id.as_str()))?;
-    Some(format!("id {twice:?} occurs twice"))
 }

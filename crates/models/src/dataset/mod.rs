@@ -6,6 +6,7 @@
 
 mod error;
 mod foreign;
+mod ids;
 mod label_file;
 mod reading;
 mod table;

@@ -11,7 +11,7 @@ use ndarray::{Array2, ArrayView2};
 use serde_json::Value;
 
 use super::error::{DatasetError, Result};
-use super::foreign::not_an_id;
+use super::ids::not_an_id;
 use super::label_file::{LabelFile, LabelSource};
 use crate::formats::TrainedOn;
 use crate::labels::{Labels, require_few};

@@ -3,7 +3,8 @@
 use corsmal_plot::{BoxPlot, BoxRow};
 use corsmal_report::{Figure, FigureGroup, Section};
 
-use crate::benchmark::method::{Method, file_name};
+use crate::benchmark::method::Method;
+use crate::benchmark::names::file_name;
 use crate::benchmark::results::{Rows, Target};
 use crate::dataset::{Container, Filling};
 use crate::error::Result;

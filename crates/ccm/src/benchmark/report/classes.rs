@@ -5,7 +5,8 @@ use corsmal_report::{Figure, FigureGroup, Section, Source};
 use ndarray::Array2;
 use rayon::prelude::*;
 
-use crate::benchmark::method::{HELD_OUT, Method, file_name, joint_names, kind_names, level_names};
+use crate::benchmark::method::{HELD_OUT, Method, joint_names, kind_names, level_names};
+use crate::benchmark::names::file_name;
 use crate::benchmark::results::{PartScores, Rows};
 use crate::error::Result;
 use crate::scores::ConfusionMatrix;

@@ -14,7 +14,7 @@ use corsmal_onnx::clip::{self, FEATURES, FRAMES};
 use corsmal_onnx::runtime::{ClipEmbedder, Runtime};
 use serde_json::json;
 
-use super::embed::Args;
+use super::args::Args;
 use crate::failure::{FAILED_FILES, Failure, INTERRUPTED};
 
 /// Views, each of which has a sequence.
