@@ -30,6 +30,11 @@ impl Windowing {
     pub fn new(window: f64, hop: f64) -> Option<Self> {
         (SECONDS.contains(&window) && SECONDS.contains(&hop)).then_some(Self { window, hop })
     }
+
+    /// Seconds of a window.
+    pub fn window(self) -> f64 {
+        self.window
+    }
 }
 
 /// A window and its features.

@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
+use corsmal_extract::config::SignalConfig;
 use corsmal_extract::engine::{Features, SignalError, Signals, Windowing, Windows};
 use corsmal_extract::inputs::Input;
 use corsmal_files::outcome::Status;
@@ -31,6 +32,7 @@ pub fn run(
     vote: Option<VotingRule>,
 ) -> Result<(End, Option<Records>), Failure> {
     let config = configuration(args, model)?;
+    cropped(&config.signal, windowing.window()).iter().for_each(|warning| warn(warning));
     let config_value = config.to_value();
     let formats = args.rule(model, &config_value)?;
     let signals = Signals::new(config);
@@ -45,6 +47,21 @@ pub fn run(
     let end = predict(args, &found, &predictor, &mut records)?;
     let nothing = matches!(end, End::Interrupted) && records.written == 0;
     Ok((end, (!nothing).then_some(records)))
+}
+
+/// That features leave out a part of each window of so many seconds, if they do.
+fn cropped(signal: &SignalConfig, window: f64) -> Option<String> {
+    let SignalConfig { start, end, .. } = signal;
+    let start = (*start > 0.0).then(|| format!("signal.start = {start}"));
+    let end = (*end > 0.0 && *end < window).then(|| format!("signal.end = {end}"));
+    let keys: Vec<String> = start.into_iter().chain(end).collect();
+    (!keys.is_empty()).then(|| {
+        format!(
+            "{}: the model's features leave out a part of each window, as they do of each recording: for features of \
+             whole windows, train without",
+            keys.join(", ")
+        )
+    })
 }
 
 fn predict(

@@ -292,6 +292,36 @@ fn lengths_unlike_those_of_the_training_are_said() {
     assert!(inspected.contains("Hz, 1 channel, 1 s"), "{inspected}");
 }
 
+/// Features that leave out the beginning of a recording left out that of each window, without a word.
+#[test]
+fn cropped_windows_are_said() {
+    let trained = Trained::new(&["--classifier", "knn", "--set", "k=1"]);
+    let (feats, model) = (trained.path("c.npz"), trained.path("c"));
+    let said = |keys: &[&str], window: &str| {
+        let list = trained.path("list.csv");
+        let keys: Vec<&str> = keys.iter().flat_map(|key| ["--set", key]).collect();
+        let extract =
+            ["extract", text(&list), "-o", text(&feats), "--preset", "esc26", "-q", "--overwrite"];
+        done(&[&extract[..], &keys].concat());
+        let learn =
+            ["train", text(&feats), "--target", "kind", "-o", text(&model), "-q", "--overwrite"];
+        done(&learn);
+        let wav = trained.path("train/0.wav");
+        let output = run(&["classify", "-m", text(&model), text(&wav), "-q", "--window", window]);
+        assert!(output.status.success());
+        String::from_utf8(output.stderr).unwrap()
+    };
+    assert_eq!(said(&[], "1"), "");
+    let start = said(&["signal.start=0.25"], "1");
+    assert!(
+        start.starts_with("warning: signal.start = 0.25: the model's features leave out"),
+        "{start}"
+    );
+    let both = said(&["signal.start=0.25", "signal.end=0.75"], "1");
+    assert!(both.contains(": signal.start = 0.25, signal.end = 0.75: "), "{both}");
+    assert_eq!(said(&["signal.end=0.75"], "0.5"), "");
+}
+
 /// The missing end of a cut file is said where each window has a line of its own, too.
 #[test]
 fn a_cut_recording_is_said() {
