@@ -158,6 +158,9 @@ def existing(path: Any) -> str:
     try:
         os.stat(name)
     except OSError as error:
+        if "://" in name:
+            told = f"{name}: this reads files on a disk: copy it to one (extract reads stores)"
+            raise MissingFileError(told) from error
         raise of_file(error) from error
     except ValueError as error:  # a zero byte
         raise ParameterError(f"{name!r}: {error}") from error

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+from typing import Any
+
 __all__ = [
     "ConfigError",
     "CorsmalFeatError",
@@ -62,6 +65,15 @@ class FileError(RunError, OSError):
     # An OSError shows its arguments.
     __str__ = Exception.__str__
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # An OSError gets these of its arguments alone.
+        kept = ("errno", "strerror", "filename")
+        return type(self), self.args, {name: getattr(self, name) for name in kept}
+
 
 class MissingFileError(FileError, DecodeError, FileNotFoundError):
     """A file does not exist."""
+
+    def __init__(self, *args: object) -> None:
+        super().__init__(*args)
+        self.errno = self.errno or errno.ENOENT

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import copy
+import errno
 import io
+import pickle
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -177,6 +180,35 @@ def test_impossible_parts_are_refused(recordings: dict[str, Path], tmp_path: Pat
         cf.stream(path, block_length=0, frame_length=10, hop_length=5)
     with pytest.raises(cf.ParameterError, match="hop_length"):
         cf.stream(path, block_length=2, frame_length=10, hop_length=11)
+
+
+def test_errors_name_the_file_wherever_they_come(
+    recordings: dict[str, Path], tmp_path: Path
+) -> None:
+    chained = tmp_path / "chained.ogg"
+    chained.write_bytes(b"".join(recordings[f"{n}.ogg"].read_bytes() for n in ("mono", "stereo")))
+    with pytest.raises(cf.DecodeError, match=r"chained\.ogg: "):
+        cf.load(chained)
+    with pytest.raises(cf.MissingFileError, match="copy it to one"):
+        cf.load("s3://bucket/x.wav")
+
+
+def test_file_errors_keep_what_the_system_said(tmp_path: Path) -> None:
+    """Process pools pickle them, and their numbers were lost."""
+    errors = []
+    for read in (cf.load, cf.load_features, cf.extract):
+        with pytest.raises(cf.MissingFileError) as caught:
+            read(str(tmp_path / "nothing.wav"))
+        errors.append(caught.value)
+    with pytest.raises(cf.FileError) as caught:
+        cf.load(tmp_path / ("x" * 300))
+    errors.append(caught.value)
+    for error in errors:
+        for same in (pickle.loads(pickle.dumps(error)), copy.copy(error), copy.deepcopy(error)):
+            assert type(same) is type(error) and str(same) == str(error)
+            assert (same.errno, same.filename) == (error.errno, error.filename)
+            assert same.strerror == error.strerror
+    assert [error.errno for error in errors] == [errno.ENOENT] * 3 + [errno.ENAMETOOLONG]
 
 
 def test_what_was_odd_is_told(tmp_path: Path, recordings: dict[str, Path]) -> None:

@@ -1,7 +1,9 @@
 //! What the vision baseline sees: the container in the last frame of a view, cut out.
 
+use std::fs::File;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use corsmal_files::draft;
 use corsmal_vision::{Detection, Rgb};
@@ -101,14 +103,33 @@ pub fn write(
         )));
     }
     let prefix = std::str::from_utf8(HIDDEN).unwrap_or_default();
+    remove_left(out);
     let hidden = tempfile::Builder::new().prefix(prefix).tempdir_in(out).map_err(io)?;
+    // Where a file system knows no locks, others cannot lock it either and leave it alone.
+    let lock = File::open(hidden.path()).inspect(|folder| drop(folder.try_lock()));
     let written = write_into(data, detections, (out, hidden.path()), jobs, interrupted);
-    drop(hidden);
+    drop((hidden, lock));
     if written.is_err() && created {
         // Empty, or not ours to remove.
         let _ = std::fs::remove_dir(out);
     }
     written
+}
+
+/// Removes the hidden folders that killed processes have left; those of living ones are locked.
+fn remove_left(out: &Path) {
+    for entry in std::fs::read_dir(out).into_iter().flatten().flatten() {
+        let left = |folder: File| {
+            // A new one may be about to be locked.
+            let modified = folder.metadata().and_then(|meta| meta.modified());
+            let age = modified.map(|modified| modified.elapsed().unwrap_or_default());
+            age.is_ok_and(|age| age > Duration::from_secs(10)) && folder.try_lock().is_ok()
+        };
+        let is_ours = entry.file_name().as_encoded_bytes().starts_with(HIDDEN);
+        if is_ours && File::open(entry.path()).is_ok_and(left) {
+            let _ = std::fs::remove_dir_all(entry.path());
+        }
+    }
 }
 
 /// Writes into a hidden folder, then moves all into `out`.

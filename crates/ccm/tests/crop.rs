@@ -291,10 +291,21 @@ fn labelled_pictures_are_written_once() {
     let stopped = || crop::write(&data, None, &broken_off, 2, &AtomicBool::new(true)).unwrap_err();
     assert!(matches!(stopped(), CcmError::Interrupted));
     assert!(!broken_off.exists());
-    // A folder of the user stays, with what a killed run left in it; the next run passes that over.
-    std::fs::create_dir_all(broken_off.join(".crops-killed")).unwrap();
+    // A folder of the user stays, and what another run has just begun in it. What a killed one left long ago is removed.
+    let killed = broken_off.join(".crops-killed");
+    std::fs::create_dir_all(&killed).unwrap();
     assert!(matches!(stopped(), CcmError::Interrupted));
     assert_eq!(std::fs::read_dir(&broken_off).unwrap().count(), 1);
+    write(&killed.join("1.png"), b"part");
+    let hour = std::time::Duration::from_secs(3600);
+    let folder = std::fs::File::open(&killed).unwrap();
+    folder.set_modified(std::time::SystemTime::now() - hour).unwrap();
+    folder.lock().unwrap();
+    assert!(matches!(stopped(), CcmError::Interrupted));
+    assert!(killed.is_dir(), "of a run that is alive");
+    drop(folder);
+    assert!(matches!(stopped(), CcmError::Interrupted));
+    assert!(!killed.exists());
     crop::write(&data, None, &broken_off, 2, &AtomicBool::new(false)).unwrap();
     assert!(broken_off.join("labels.csv").exists());
 }

@@ -153,7 +153,7 @@ impl Request<'_> {
         let files = match (examples.is_of_recordings(), examples.pictures()) {
             (true, _) => Value::Null,
             (false, Some(identity)) => {
-                json!({ "pictures": self.dataset.path(), "identity": identity })
+                json!({ "pictures": self.dataset.path().display().to_string(), "identity": identity })
             }
             (false, None) => self.dataset.provenance()?,
         };

@@ -25,6 +25,11 @@ pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     draft::write(path, bytes)
 }
 
+/// Whether what is written there is delivered at once, and not when all of it is there.
+pub fn is_delivered(path: &Path) -> bool {
+    is_stdout(path) || draft::is_device(path)
+}
+
 /// Where lines go that are written as they come.
 pub enum Output {
     /// Standard output.

@@ -227,9 +227,6 @@ impl Progress for Meter {
     }
 
     fn warning(&self, message: &str) {
-        if self.quiet {
-            return;
-        }
         match self.format {
             LogFormat::Text => self.line(&format!("warning: {message}")),
             LogFormat::Json => {

@@ -17,6 +17,17 @@ pub fn check_table(path: &Path, overwrite: bool) -> Result<(), Failure> {
 /// Refuses a name that is taken, unless it is of a file that may be replaced, and a folder that is
 /// not there or takes no files.
 pub fn check(path: &Path, overwrite: bool) -> Result<(), Failure> {
+    if path == Path::new("-") {
+        return Err(Failure::new(
+            "-: this output is not written to standard output: name a file (./- for one called so)",
+        ));
+    }
+    if path.to_str().is_some_and(|name| name.contains("://")) && !path.exists() {
+        return Err(Failure::new(format!(
+            "{}: this output is written to a disk: name a file, and copy it when it is whole",
+            path.display()
+        )));
+    }
     if is_device(path) {
         return Err(Failure::new(format!(
             "{} is a device; this output gets its name when it is whole: name a file",

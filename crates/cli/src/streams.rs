@@ -4,6 +4,7 @@
 use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write};
 use std::process::exit;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use corsmal_files::quote::printable_line;
 
@@ -20,13 +21,21 @@ macro_rules! eprintln {
     ($($text:tt)*) => { $crate::streams::err(format_args!($($text)*)) };
 }
 
-/// Prints to standard output. A reader that has seen enough (`| head`) ends the process as a
-/// success; output that cannot be written is a failure.
+/// Set once whoever reads standard output has seen enough (`| head`).
+static UNREAD: AtomicBool = AtomicBool::new(false);
+
+/// Prints to standard output. Where nobody reads it any more, work goes on: its files are still to be written, and
+/// its exit code is its own. Output that cannot be written is a failure.
 pub fn out(text: Arguments<'_>) {
+    if UNREAD.load(Ordering::Relaxed) {
+        return;
+    }
     let mut stdout = io::stdout().lock();
     match stdout.write_fmt(text).and_then(|()| stdout.flush()) {
         Ok(()) => {}
-        Err(error) if error.kind() == ErrorKind::BrokenPipe => exit(0),
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => {
+            UNREAD.store(true, Ordering::Relaxed)
+        }
         Err(error) => {
             eprintln!("error: standard output: {error}");
             exit(2)

@@ -1,6 +1,7 @@
 //! Files that appear under their name only when they are whole.
 
 use std::collections::BTreeSet;
+use std::ffi::OsString;
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -11,6 +12,8 @@ use tempfile::NamedTempFile;
 
 /// What the name of a draft begins with after the name of the file that it is to become.
 const SUFFIX: &str = ".unfinished-";
+/// As many bytes of that name: a name that a system allows (255 bytes) has room for no more.
+const NAMED: usize = 200;
 
 /// A file under another name in the same folder, `.NAME.unfinished-XXXXXX`, until it is whole. Errors
 /// name the file it is to become.
@@ -30,9 +33,7 @@ impl Draft {
     pub fn create(path: &Path) -> io::Result<Self> {
         let path = destination(path);
         remove_left(folder(&path));
-        let mut prefix = std::ffi::OsString::from(".");
-        prefix.push(path.file_name().unwrap_or_default());
-        prefix.push(SUFFIX);
+        let prefix = hidden(&path, SUFFIX);
         let mut builder = tempfile::Builder::new();
         builder.prefix(&prefix);
         #[cfg(unix)]
@@ -91,8 +92,9 @@ fn remove_left(folder: &Path) {
     // What cannot be looked at cannot be tidied; whoever writes there will hear of it.
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
-        let Some(name) = name.to_str().filter(|name| name.starts_with('.')) else { continue };
-        let Some((_, random)) = name.rsplit_once(SUFFIX) else { continue };
+        let name = name.to_string_lossy();
+        let hidden = name.strip_prefix('.').and_then(|name| name.rsplit_once(SUFFIX));
+        let Some((_, random)) = hidden else { continue };
         let ours = random.len() == 6 && random.bytes().all(|byte| byte.is_ascii_alphanumeric());
         let left = |file: File| {
             // A new one may be about to be locked.
@@ -161,7 +163,22 @@ pub fn folder(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Refuses the name of a folder, and a path in whose folder no file can be made. What it makes to find out is gone
+/// What the name of something begins with that is beside a file for some time: `.NAME` and a suffix.
+pub fn hidden(path: &Path, suffix: &str) -> OsString {
+    let name = path.file_name().unwrap_or_default();
+    let mut prefix = OsString::from(".");
+    match name.len() > NAMED {
+        true => {
+            let name = name.to_string_lossy();
+            prefix.push(&name[..name.floor_char_boundary(NAMED)]);
+        }
+        false => prefix.push(name),
+    }
+    prefix.push(suffix);
+    prefix
+}
+
+/// Refuses the name of a folder, a name that the system does not allow, and a path in whose folder no file can be made. What it makes to find out is gone
 /// again.
 ///
 /// # Errors
@@ -174,7 +191,11 @@ pub fn check_place(path: &Path) -> io::Result<()> {
             format!("{}: {reason}", path.display()),
         ));
     }
-    tempfile::tempfile_in(folder(path)).map(drop).map_err(|error| refused(path, &error))
+    tempfile::tempfile_in(folder(path)).map(drop).map_err(|error| refused(path, &error))?;
+    match path.symlink_metadata() {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(named(path, &error)),
+        _ => Ok(()),
+    }
 }
 
 /// Why a file cannot be made, without the name of its draft.
@@ -230,6 +251,20 @@ mod tests {
             let expected = format!("{}: there is no folder {}", path.display(), gone.display());
             assert_eq!(error.to_string(), expected);
         }
+    }
+
+    /// The draft's name was too long, which showed when all the work was done.
+    #[test]
+    fn names_of_any_length_that_the_system_allows_are_written() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["n".repeat(251) + ".npz", "\u{e9}".repeat(125) + ".npz"] {
+            let path = folder.path().join(&name);
+            check_place(&path).unwrap();
+            write(&path, b"all").unwrap();
+            assert_eq!(std::fs::read(&path).unwrap(), b"all");
+        }
+        let longer = folder.path().join("n".repeat(256));
+        assert!(check_place(&longer).unwrap_err().to_string().contains("too long"));
     }
 
     #[test]

@@ -98,7 +98,7 @@ pub struct Folds {
 
 impl Folds {
     /// Carries out a plan; without one, each group once where there are groups (`groups`, or a
-    /// column called container or group), else stratified folds.
+    /// column called container or group, but for the target), else stratified folds.
     ///
     /// # Errors
     /// Columns that are not there, groups that the folds would split, classes with too few rows.
@@ -123,7 +123,9 @@ impl Folds {
             None => CvPlan::K(FOLDS),
         };
         let plan = plan.unwrap_or(&default);
-        let of_windows = !matches!(plan, CvPlan::Lists(_)) && has_groups(table, RECORDING);
+        let of_windows = !matches!(plan, CvPlan::Lists(_))
+            && has_groups(table, RECORDING)
+            && !is_target(RECORDING);
         let groups = groups.or(of_windows.then_some(RECORDING));
         let column = match plan {
             CvPlan::Group(column) | CvPlan::Fold(column) => Some(column.as_str()),
@@ -374,6 +376,13 @@ mod tests {
         );
         let kept = folds(Some(&CvPlan::K(2)), Some("group")).warnings(&classes).join(" ");
         assert!(!kept.contains("--groups"), "{kept}");
+
+        // A target of this name was its own groups: each fold was of a class that no other had.
+        let sound = ["studio", "phone", "studio", "phone"];
+        let named = table([("recording", sound)]);
+        let (of_sound, sounds) = named.classes("recording").unwrap();
+        let found = Folds::new(Some(&CvPlan::K(2)), &named, None, (&of_sound, &sounds), 0).unwrap();
+        assert!(found.description.contains("stratified"), "{}", found.description);
 
         let apart = table([("y", ["a", "b", "a", "b"]), ("group", ["1", "2", "3", ""])]);
         let (y, of_y) = apart.classes("y").unwrap();

@@ -1,6 +1,6 @@
 //! What a detector found in a frame, as rows of a table of detections.
 
-use corsmal_vision::{Category, Mask, Rgb, category_name, compress};
+use corsmal_vision::{Category, Mask, Rgb, category_name, check_box, compress};
 use serde_json::{Value, json};
 
 /// Masks hold a pixel from here on.
@@ -56,9 +56,10 @@ impl Instances<'_> {
         let mut rows = Vec::new();
         for i in 0..count {
             let (bounds, certain) = (self.boxes[i], self.scores[i]);
-            if !(0.0..=1.0).contains(&certain) || !bounds.iter().all(|edge| edge.is_finite()) {
-                return Err(format!("detection {i}: score {certain}, box {bounds:?}"));
+            if !(0.0..=1.0).contains(&certain) {
+                return Err(format!("detection {i}: '{certain}' is not a score from 0 to 1"));
             }
+            check_box(bounds.map(f64::from)).map_err(|why| format!("detection {i}: {why}"))?;
             let name = u8::try_from(self.labels[i]).ok().and_then(category_name);
             let Some(name) = name.filter(|_| certain >= score) else { continue };
             let mut row = json!({
@@ -128,6 +129,16 @@ mod tests {
 
         let strange = Instances { scores: &[0.9, f32::NAN, 0.7, 0.1], ..found };
         assert!(strange.rows((3, 7), (2, 2), 0.25).unwrap_err().contains("detection 1"));
+        // Tables with such boxes were written, and refused by whoever read them.
+        for (bounds, why) in [
+            ([558.0, 559.0, 68.0, 68.0], "right or lower edge comes first"),
+            ([0.0, 0.0, 2e6, 2.0], "'2000000' is not an edge"),
+            ([0.0, 0.0, f32::INFINITY, 2.0], "'inf' is not an edge"),
+        ] {
+            let boxes = [bounds, bounds, bounds, bounds];
+            let said = Instances { boxes: &boxes, ..found }.rows((3, 7), (2, 2), 0.25);
+            assert!(said.unwrap_err().contains(why), "{bounds:?}");
+        }
         let fewer = Instances { labels: &found.labels[..3], ..found };
         assert!(fewer.rows((3, 7), (2, 2), 0.25).unwrap_err().contains("3 labels"));
     }

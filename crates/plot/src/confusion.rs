@@ -25,6 +25,8 @@ pub struct ConfusionMatrix {
 
 const SIZE: f64 = 12.0;
 const BAR: f64 = 96.0;
+/// Classes of the largest matrix whose empty cells are drawn.
+const LARGE: usize = 24;
 
 impl ConfusionMatrix {
     fn classes(&self) -> usize {
@@ -49,7 +51,7 @@ impl ConfusionMatrix {
             0..=5 => 62.0,
             6..=8 => 54.0,
             9..=12 => 46.0,
-            13..=24 => 34.0,
+            13..=LARGE => 34.0,
             _ => 24.0,
         }
     }
@@ -122,8 +124,17 @@ impl ConfusionMatrix {
         let style = TextStyle::new(SIZE, Paint::Ink, Anchor::End);
         on.text(left - 8.0, y + height / 2.0 + 4.0, &name, style);
         let total = (0..self.columns()).fold(0u64, |n, c| n.saturating_add(self.count(row, c)));
+        // Of many classes most cells are empty: the squares of these say nothing.
+        let is_large = self.classes() > LARGE;
+        if is_large {
+            let place = Rect::new(left + 1.0, y + 1.0, self.width() - 2.0, height - 2.0);
+            on.shade(place, Paint::Warm, 0.05, 3.0);
+        }
         for column in 0..self.columns() {
             let count = self.count(row, column);
+            if is_large && count == 0 {
+                continue;
+            }
             let share = if total > 0 { count as f64 / total as f64 } else { 0.0 };
             let fill = if row == column { Paint::Accent } else { Paint::Warm };
             let x = left + cell * column as f64;

@@ -209,7 +209,8 @@ fn confusion_matrices() {
     assert!(svg.contains("pasta estimated as none given: 7 of 7"));
     let many = (0..50).map(|i| format!("class number {i}")).collect();
     let many = ConfusionMatrix { labels: many, counts: Array2::eye(50), ..confusion() };
-    check(&many, "confusion-many");
+    let svg = check(&many, "confusion-many");
+    assert_eq!(svg.matches("estimated as").count(), 50, "empty cells are left out");
 }
 
 #[test]

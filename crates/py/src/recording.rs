@@ -20,11 +20,19 @@ fn decode_error(error: AudioError) -> PyErr {
 
 /// An open recording.
 #[pyclass(frozen, name = "Recording", module = "corsmal_feat._core")]
-pub(crate) struct PyRecording(Mutex<Box<dyn BlockSource>>);
+pub(crate) struct PyRecording {
+    source: Mutex<Box<dyn BlockSource>>,
+    /// What its errors begin with: the path, where it has one.
+    place: String,
+}
 
 impl PyRecording {
     fn source(&self) -> MutexGuard<'_, Box<dyn BlockSource>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.source.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn fault(&self, error: AudioError) -> PyErr {
+        DecodeError::new_err(format!("{}{error}", self.place))
     }
 }
 
@@ -55,14 +63,14 @@ impl PyRecording {
     #[staticmethod]
     fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let source = py.detach(|| open(&path)).map_err(decode_error)?;
-        Ok(Self(Mutex::new(source)))
+        Ok(Self { source: Mutex::new(source), place: format!("{}: ", path.display()) })
     }
 
     /// Reads a recording that is in memory.
     #[staticmethod]
     fn from_bytes(py: Python<'_>, bytes: Vec<u8>) -> PyResult<Self> {
         let source = py.detach(|| from_seekable(Cursor::new(bytes))).map_err(decode_error)?;
-        Ok(Self(Mutex::new(source)))
+        Ok(Self { source: Mutex::new(source), place: String::new() })
     }
 
     /// Frames per second.
@@ -83,7 +91,7 @@ impl PyRecording {
             let at = source.health().decoded_frames.saturating_add(frames);
             source.go_to(at)
         };
-        py.detach(work).map_err(decode_error)
+        py.detach(work).map_err(|e| self.fault(e))
     }
 
     /// The next samples [frames, channels], up to `frames` frames or, without it, to the end.
@@ -97,7 +105,7 @@ impl PyRecording {
                 read_into(&mut **source, frames.unwrap_or(usize::MAX), &mut samples)?;
                 Ok((samples, channels))
             })
-            .map_err(decode_error)?;
+            .map_err(|e| self.fault(e))?;
         let shape = (samples.len() / channels, channels);
         into_numpy(py, Array2::from_shape_vec(shape, samples).map_err(value_error)?)
     }
@@ -115,12 +123,12 @@ impl PyRecording {
                 }
             }
         };
-        py.detach(work).map_err(decode_error)
+        py.detach(work).map_err(|e| self.fault(e))
     }
 
     /// Frames by the header, where the end of the file bears it out.
     fn confirmed_frames(&self, py: Python<'_>) -> PyResult<Option<u64>> {
-        py.detach(|| self.source().confirmed_frames()).map_err(decode_error)
+        py.detach(|| self.source().confirmed_frames()).map_err(|e| self.fault(e))
     }
 
     /// What was odd so far, in words.

@@ -15,6 +15,10 @@ use crate::{latex, page};
 
 /// Folders of tables and of figures.
 const FOLDERS: [&str; 2] = ["tables", "figures"];
+/// The report for people, which is written last.
+const PAGE: &str = "report.html";
+/// The report for programs.
+const DOCUMENT: &str = "report.json";
 
 /// `report.json`.
 #[derive(Serialize)]
@@ -47,36 +51,49 @@ impl Report {
         let [tables, figures] = FOLDERS;
         let places = [folder(tables)?, folder(figures)?];
         // What another report left here would pass as part of this one.
-        for name in earlier(dir) {
-            let path = dir.join(name);
+        let page = dir.join(PAGE);
+        for path in earlier(dir).into_iter().map(|name| dir.join(name)).chain([page.clone()]) {
             let removed = std::fs::remove_file(&path);
             removed
                 .or_else(|e| if e.kind() == ErrorKind::NotFound { Ok(()) } else { Err(e) })
                 .map_err(|source| ReportError::Remove { path, source })?;
         }
-        let mut files = Vec::new();
-        let mut rows = self.sections.iter().flat_map(|s| &s.tables).flat_map(|t| &t.rows);
-        let mixed = rows.any(|row| row.source != Source::Ours);
+        let drawn = self.drawn(more);
+        let shown = self.sections.iter().flat_map(|s| &s.tables);
+        let of_tables = shown
+            .clone()
+            .flat_map(|table| ["csv", "tex"].map(|e| format!("{tables}/{}.{e}", table.name)));
+        let of_figures = drawn
+            .iter()
+            .flat_map(|(name, _)| ["svg", "pdf"].map(|e| format!("{figures}/{name}.{e}")));
+        let files: Vec<String> = of_tables.chain(of_figures).collect();
+        let document = serde_json::to_string_pretty(&Document { report: self, files: &files })?;
         let put = |path: &Path, bytes: &[u8]| draft::write(path, bytes).map_err(ReportError::Write);
-        for table in self.sections.iter().flat_map(|s| &s.tables) {
+        // First, so that the next report removes what this one leaves if it breaks off.
+        put(&dir.join(DOCUMENT), document.as_bytes())?;
+        let mut rows = shown.clone().flat_map(|t| &t.rows);
+        let mixed = rows.any(|row| row.source != Source::Ours);
+        for table in shown {
             put(&places[0].join(format!("{}.csv", table.name)), table.csv(mixed)?.as_bytes())?;
             put(&places[0].join(format!("{}.tex", table.name)), latex::table(table).as_bytes())?;
-            files.extend(["csv", "tex"].map(|e| format!("{tables}/{}.{e}", table.name)));
         }
+        for (name, figure) in drawn {
+            figure.write(&places[1], &name)?;
+        }
+        put(&page, self.html().as_bytes())
+    }
+
+    /// All figures, each under a name of its own: methods of other names may have one name in small letters.
+    fn drawn<'r>(&'r self, more: &'r [Figure]) -> Vec<(String, &'r Figure)> {
         let grouped = self.sections.iter().flat_map(|s| &s.groups).flat_map(|g| &g.figures);
         let shown = self.sections.iter().flat_map(|s| &s.figures);
         let mut names = HashSet::new();
-        for figure in shown.chain(grouped).chain(more) {
-            // Methods of other names may have one name in small letters.
+        let named = |figure: &'r Figure| {
             let numbered = (2..).map(|n| format!("{}-{n}", figure.name));
             let mut names_of = std::iter::once(figure.name.clone()).chain(numbered);
-            let Some(name) = names_of.find(|name| names.insert(name.clone())) else { continue };
-            figure.write(&places[1], &name)?;
-            files.extend(["svg", "pdf"].map(|e| format!("{figures}/{name}.{e}")));
-        }
-        let document = Document { report: self, files: &files };
-        put(&dir.join("report.json"), serde_json::to_string_pretty(&document)?.as_bytes())?;
-        put(&dir.join("report.html"), self.html().as_bytes())
+            names_of.find(|name| names.insert(name.clone())).map(|name| (name, figure))
+        };
+        shown.chain(grouped).chain(more).filter_map(named).collect()
     }
 }
 
@@ -120,7 +137,7 @@ impl EarlierSection {
 
 /// The files that an earlier report says it wrote.
 fn earlier(dir: &Path) -> Vec<String> {
-    let written = std::fs::read(dir.join("report.json")).ok();
+    let written = std::fs::read(dir.join(DOCUMENT)).ok();
     let written = written.and_then(|text| serde_json::from_slice::<Earlier>(&text).ok());
     let Earlier { files, sections } = written.unwrap_or_default();
     let named = || sections.iter().flat_map(EarlierSection::files).collect();

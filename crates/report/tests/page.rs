@@ -158,3 +158,23 @@ fn every_table_and_figure_has_its_files() {
     let error = report().write(&blocked.join("x"), &[]).unwrap_err().to_string();
     assert!(error.starts_with("cannot make the folder"), "{error}");
 }
+
+/// It said that its own files were another's, also when it was to replace them.
+#[test]
+fn what_a_report_leaves_that_breaks_off_is_removed_by_the_next() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    std::fs::create_dir_all(at("figures/open.svg")).unwrap();
+    report().write(dir.path(), &[]).unwrap_err();
+    assert!(at("tables/t2.csv").is_file() && !at("report.html").exists());
+    let said: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(at("report.json")).unwrap()).unwrap();
+    let files: Vec<&str> =
+        said["files"].as_array().unwrap().iter().filter_map(|file| file.as_str()).collect();
+    assert!(files.contains(&"tables/t2.csv") && files.contains(&"figures/open.svg"), "{files:?}");
+    std::fs::remove_dir(at("figures/open.svg")).unwrap();
+    corsmal_report::Report::new("empty").write(dir.path(), &[]).unwrap();
+    let left = |folder: &str| std::fs::read_dir(at(folder)).unwrap().count();
+    assert_eq!((left("tables"), left("figures")), (0, 0));
+    assert!(at("report.html").is_file());
+}

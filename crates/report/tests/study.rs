@@ -131,6 +131,23 @@ fn errors_are_listed_from_the_most_confident_on() {
     assert!(html.contains("1.50 to 2.00 s"));
 }
 
+/// A page of 200 classes took minutes to draw, one of 4,096 would have been gigabytes.
+#[test]
+fn very_many_classes_are_listed_and_not_drawn() {
+    let class = ClassScore { precision: 90.0, recall: 80.0, f1: 84.7, support: 20 };
+    let of = |count: usize| {
+        let classes = (0..count).map(|i| format!("class {i}")).collect();
+        let class_scores = vec![class; count];
+        let many = Study { classes, class_scores, confusion: Array2::eye(count), ..study() };
+        let report = many.report().unwrap();
+        report.sections.into_iter().find(|s| s.id == "confusion").unwrap()
+    };
+    let (drawn, listed) = (of(100), of(101));
+    assert_eq!((drawn.figures.len(), listed.figures.len()), (1, 0));
+    assert_eq!(listed.tables[0].rows.len(), 101);
+    assert!(listed.text[0].contains("more than 100 classes is not drawn"), "{:?}", listed.text);
+}
+
 #[test]
 fn what_is_not_known_is_left_out() {
     let bare = Study { title: "t".into(), target: "class".into(), ..Study::default() };

@@ -76,8 +76,10 @@ fn connect(uri: &Uri) -> Result<Arc<dyn ObjectStore>, StoreError> {
 
 fn amazon(uri: &Uri) -> Result<AmazonS3Builder, StoreError> {
     use AmazonS3ConfigKey as Key;
-    let mut builder =
-        AmazonS3Builder::from_env().with_bucket_name(uri.bucket()).with_retry(retry());
+    let mut builder = AmazonS3Builder::new().with_bucket_name(uri.bucket()).with_retry(retry());
+    for (key, value) in environment()? {
+        builder = builder.with_config(key, value);
+    }
     let set = |builder: &AmazonS3Builder, key| builder.get_config_value(&key).is_some();
     let has_role = set(&builder, Key::WebIdentityTokenFile) && set(&builder, Key::RoleArn);
     let unsigned = builder.get_config_value(&Key::SkipSignature).is_some_and(|v| is_yes(&v));
@@ -95,14 +97,55 @@ fn amazon(uri: &Uri) -> Result<AmazonS3Builder, StoreError> {
         }
     }
     let endpoint = [Key::S3Endpoint, Key::Endpoint].map(|key| builder.get_config_value(&key));
-    // Whoever names an endpoint without encryption wants it.
-    if endpoint.iter().flatten().next().is_some_and(|endpoint| endpoint.starts_with("http://")) {
-        builder = builder.with_config(Key::Client(ClientConfigKey::AllowHttp), "true");
+    if let Some(endpoint) = endpoint.iter().flatten().next() {
+        require_address(endpoint)?;
+        // Whoever names an endpoint without encryption wants it.
+        if endpoint.starts_with("http://") {
+            builder = builder.with_config(Key::Client(ClientConfigKey::AllowHttp), "true");
+        }
     }
     for (key, value) in TIMES {
         builder = builder.with_config(Key::Client(key), value);
     }
     Ok(builder)
+}
+
+/// What the environment says of S3. Variables without a value count as absent, as AWS's own tools have it.
+///
+/// # Errors
+/// A value that no request can carry: the client panics at it.
+fn environment() -> Result<Vec<(AmazonS3ConfigKey, String)>, StoreError> {
+    let mut found = Vec::new();
+    for (name, value) in std::env::vars_os() {
+        let (Some(name), Some(value)) = (name.to_str(), value.to_str()) else { continue };
+        let key = name.starts_with("AWS_").then(|| name.to_ascii_lowercase().parse().ok());
+        let Some(key) = key.flatten().filter(|_| !value.is_empty()) else { continue };
+        if value.contains(char::is_control) {
+            return Err(StoreError::Setup(format!(
+                "{name} holds a control character, such as a line feed at its end: set it without"
+            )));
+        }
+        found.push((key, value.to_owned()));
+    }
+    Ok(found)
+}
+
+/// Refuses an endpoint that is no address: the client panics at it. It may hold a password, which nothing shows.
+fn require_address(endpoint: &str) -> Result<(), StoreError> {
+    let host = ["http://", "https://"].iter().find_map(|scheme| endpoint.strip_prefix(scheme));
+    let is_host = |host: &str| {
+        !host.is_empty()
+            && !host.starts_with('/')
+            && !host.contains([' ', '\t', '\\', '<', '>', '"'])
+    };
+    match host.is_some_and(is_host) {
+        true => Ok(()),
+        false => Err(StoreError::Setup(
+            "AWS_ENDPOINT_URL, or endpoint_url of the profile, must be an address with http:// or https://, such as \
+             http://localhost:9000"
+                .into(),
+        )),
+    }
 }
 
 /// Whether a setting is on, in the words that the client knows.
@@ -171,5 +214,22 @@ fn setup(error: object_store::Error) -> StoreError {
     match StoreError::from(error) {
         StoreError::Failed(reason) => StoreError::Setup(reason),
         other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The client panicked in a thread, and the message was that a request had ended.
+    #[test]
+    fn endpoints_are_addresses() {
+        for good in ["http://localhost:9000", "https://s3.example.org/", "http://[::1]:5000"] {
+            assert_eq!(require_address(good), Ok(()), "{good}");
+        }
+        for bad in ["localhost:9000", "", "http://", "http:///x", "http://my host", "ftp://host"] {
+            let said = require_address(bad).unwrap_err().to_string();
+            assert!(said.contains("AWS_ENDPOINT_URL") && said.contains("http://"), "{bad}: {said}");
+        }
     }
 }

@@ -58,6 +58,9 @@ const ELSEWHERE: [&str; 2] = ["AWS_METADATA_ENDPOINT", "AWS_CONTAINER_CREDENTIAL
 /// Answers of a server that is asked too early or too often.
 const LATER: [&str; 2] = ["408 ", "429 "];
 
+/// Codes of stores for a bucket that is not there.
+const NO_BUCKET: [&str; 2] = ["(NoSuchBucket)", "(ContainerNotFound)"];
+
 impl StoreError {
     /// Whether the next try may bring what this one did not.
     pub(crate) fn is_worth_another_try(&self) -> bool {
@@ -79,7 +82,15 @@ impl From<object_store::Error> for StoreError {
                 "the server does not support range requests: download the file".into(),
             ),
             _ if is_of_credentials(&error.to_string()) => Self::Setup(NO_CREDENTIALS.into()),
+            // Names that are given are looked at before: this one is of a listing.
+            E::InvalidPath { source } => Self::Unsupported(format!(
+                "the listing has a key that is not read ({source}): list a folder without it, or name the objects in a \
+                 manifest"
+            )),
             _ => match words(&error) {
+                answer if NO_BUCKET.iter().any(|code| answer.ends_with(code)) => {
+                    Self::Setup("the store has no such bucket".into())
+                }
                 // The second is what the client finds itself.
                 answer if answer.starts_with("416 ") || answer.starts_with("Wanted range") => {
                     Self::Beyond
@@ -168,6 +179,10 @@ mod tests {
             let error = object_store::Error::Generic { store: "S3", source };
             matches!(StoreError::from(error), StoreError::Refused(_))
         };
+        let source =
+            "Server returned non-2xx status code: 404 Not Found: <Code>NoSuchBucket</Code>";
+        let error = object_store::Error::Generic { store: "S3", source: source.into() };
+        assert_eq!(StoreError::from(error).to_string(), "the store has no such bucket");
         assert!(is_refused("404 Not Found") && is_refused("400 Bad Request"));
         assert!(!is_refused("429 Too Many Requests") && !is_refused("503 Slow Down"));
     }

@@ -10,6 +10,9 @@ use crate::object::{Object, Version};
 use crate::runtime;
 use crate::uri::{Scheme, Uri};
 
+/// How often a listing is asked for again.
+const MORE: u32 = 2;
+
 /// All objects below a folder, at any depth, sorted by the bytes of their keys. Waiting ends when `stop`
 /// is set.
 ///
@@ -22,11 +25,19 @@ pub fn list(folder: &Uri, stop: &AtomicBool) -> Result<Vec<Object>, StoreError> 
         ));
     }
     let (store, path) = (connect::store(folder)?, folder.path()?);
-    let listing = runtime::spawn(async move {
-        let prefix = (!path.is_root()).then_some(path);
-        store.list(prefix.as_ref()).try_collect::<Vec<_>>().await
-    });
-    let found = runtime::wait(&listing, stop)??;
+    let prefix = (!path.is_root()).then_some(path);
+    let mut tries = 0;
+    let found = loop {
+        let (store, prefix) = (store.clone(), prefix.clone());
+        let listing = runtime::spawn(async move {
+            store.list(prefix.as_ref()).try_collect::<Vec<_>>().await.map_err(StoreError::from)
+        });
+        match runtime::wait(&listing, stop)? {
+            // The client does not ask again for a page that broke off.
+            Err(error) if error.is_worth_another_try() && tries < MORE => tries += 1,
+            found => break found?,
+        }
+    };
     let object = |meta: object_store::ObjectMeta| Object {
         uri: folder.with_key(meta.location.as_ref()),
         listed: Some(Version::of(&meta)),

@@ -89,8 +89,22 @@ impl Sending {
             Existing::Keep => PutMode::Create,
             Existing::Replace => PutMode::Overwrite,
         };
-        let put = self.store.put_opts(&self.path, bytes.into(), mode.into());
-        until(put, stop).await?.map(drop).map_err(StoreError::from)
+        let put = self.store.put_opts(&self.path, bytes.clone().into(), mode.into());
+        match until(put, stop).await?.map(drop).map_err(StoreError::from) {
+            // The answer to it may have been lost, and the client's next try met the object.
+            Err(StoreError::Exists) if until(self.holds(&bytes), stop).await? => Ok(()),
+            sent => sent,
+        }
+    }
+
+    /// Whether the object has these bytes.
+    async fn holds(&self, bytes: &Bytes) -> bool {
+        match self.store.get(&self.path).await {
+            Ok(there) if there.meta.size == bytes.len() as u64 => {
+                there.bytes().await.is_ok_and(|there| there == *bytes)
+            }
+            Ok(_) | Err(_) => false,
+        }
     }
 
     async fn parts(self, content: File, stop: &AtomicBool) -> Result<(), StoreError> {
@@ -223,6 +237,14 @@ mod tests {
                 "{size}"
             );
         }
+    }
+
+    /// A store whose answer was lost has the object: the next try of the client meets it.
+    #[test]
+    fn an_object_that_arrived_is_sent() {
+        let content: Vec<u8> = (0..10usize).map(|i| ((i * 7919) >> 5) as u8).collect();
+        let (_, sent, there) = send(10, Some(&content), Existing::Keep, false);
+        assert_eq!((sent, there), (Ok(()), Some(content)));
     }
 
     #[test]

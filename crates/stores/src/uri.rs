@@ -75,12 +75,17 @@ impl Uri {
         if bucket.is_empty() {
             return Err(wrong("has no bucket".into()));
         }
-        if scheme != Scheme::Web && bucket.contains(':') {
+        let is_account = scheme == Scheme::Azure;
+        if scheme != Scheme::Web && (bucket.contains(':') || bucket.contains('@') && !is_account) {
             // A key and its secret would stand in messages and outputs.
             return Err(StoreError::Name {
                 name: "an address in a store".into(),
                 reason: "must not contain a user name, password or port".into(),
             });
+        }
+        let allowed = |c: char| c.is_ascii_alphanumeric() || "._-@".contains(c);
+        if let Some(other) = bucket.chars().find(|c| scheme != Scheme::Web && !allowed(*c)) {
+            return Err(wrong(format!("has {other:?} in its bucket, which no store allows")));
         }
         let (key, query) = match scheme {
             Scheme::Web => {
@@ -215,6 +220,7 @@ mod tests {
             "http://h/a//b?secret",
             "s3://id:secret@bucket/x.wav",
             "s3://id:sec/ret@secret/x.wav",
+            "s3://secret@bucket/x.wav",
         ] {
             let error = Uri::parse(name).unwrap_err();
             assert!(!format!("{error} {error:?}").contains("secret"), "{error:?}");
@@ -229,6 +235,8 @@ mod tests {
             "s3://b/a//x.wav",
             "s3://b//x.wav",
             "s3://b/../x.wav",
+            "s3://my bucket/x.wav",
+            "gs://b\u{e9}/x.wav",
             "hdfs://b/x.wav",
             "file:///x.wav",
             "x.wav",

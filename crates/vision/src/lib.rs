@@ -47,7 +47,7 @@ pub use calibration::{BackProjection, Calibration, Camera};
 pub use category::Category;
 pub use coco::{category_name, compress};
 pub use contour::{Contour, contours, largest};
-pub use detections::{Detection, read_detections};
+pub use detections::{Detection, check_box, read_detections};
 pub use error::{Result, VisionError};
 pub use gaussian_process::{GaussianProcess, Normal};
 pub use image::{Depth, Rgb};

@@ -63,7 +63,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     told.tell(
         || {
             json!({
-                "out": out, "crops": crops, "recordings": recordings, "views_without": without,
+                "out": out.display().to_string(), "crops": crops, "recordings": recordings, "views_without": without,
                 "failed": failures, "synthetic": synthetic,
             })
         },

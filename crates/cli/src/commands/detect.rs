@@ -123,7 +123,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
             kept += 1;
             continue;
         }
-        match seen(&mut detector, &views, &args) {
+        match seen(&mut detector, (recording, &views), &args) {
             Err(Fault::Recording(reason)) => {
                 eprintln!("{}: {reason}", recording.path.display());
                 failed += 1;
@@ -148,7 +148,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     args.told.tell(
         || {
             json!({
-                "out": out, "recordings": recordings, "written": written, "kept": kept,
+                "out": out.display().to_string(), "recordings": recordings, "written": written, "kept": kept,
                 "without_frames": without, "failed": failed,
             })
         },
@@ -182,7 +182,7 @@ fn made_by(args: &Args, tables: &[PathBuf]) -> Result<(), Failure> {
         Frames::Every(step) => format!("every={step}"),
     };
     let about = serde_json::json!({
-        "model": identity, "data": args.data.canonicalize()?, "frames": frames,
+        "model": identity, "data": args.data.canonicalize()?.display().to_string(), "frames": frames,
         "views": chosen_views(args), "score": args.score,
         "tool_version": env!("CARGO_PKG_VERSION"),
     });
@@ -228,7 +228,7 @@ impl From<corsmal_ccm::capacity::Problem> for Fault {
 #[cfg(feature = "onnx")]
 fn seen(
     detector: &mut corsmal_onnx::runtime::Detector,
-    views: &corsmal_ccm::capacity::Views,
+    (recording, views): (&corsmal_ccm::dataset::Recording, &corsmal_ccm::capacity::Views),
     args: &Args,
 ) -> Result<Option<Vec<serde_json::Value>>, Fault> {
     let ends = match args.frames {
@@ -258,9 +258,11 @@ fn seen(
             let size = (image.width, image.height);
             let found = detector
                 .detect(&image, |found| found.rows((view, number), size, args.score as f32));
-            let path = args.model.display();
-            let found = found.map_err(|e| Fault::Model(e.into()))?;
-            rows.extend(found.map_err(|e| Fault::Model(Failure::new(format!("{path}: {e}"))))?);
+            let (model, path) = (args.model.display(), recording.path.display());
+            let found = found.map_err(|e| e.to_string());
+            let found = found.and_then(|rows| rows.map_err(|why| format!("{model}: {why}")));
+            let of_frame = |why| format!("{path}, view {view}, frame {number}: {why}");
+            rows.extend(found.map_err(|why| Fault::Model(Failure::new(of_frame(why))))?);
         }
     }
     Ok(any.then_some(rows))

@@ -57,7 +57,10 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         merged => merged?,
     }
     args.told.tell(
-        || json!({ "out": args.out, "shards": args.shards }),
+        || {
+            let shards = args.shards.iter().map(|shard| shard.display().to_string());
+            json!({ "out": args.out.display().to_string(), "shards": shards.collect::<Vec<_>>() })
+        },
         || format!("{}: {} merged", args.out.display(), plural(args.shards.len(), "shard")),
     )?;
     Ok(ExitCode::SUCCESS)

@@ -52,7 +52,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     projection.save(&args.out)?;
     let (from, to) = (projection.n_inputs(), projection.n_components());
     args.told.tell(
-        || json!({ "out": args.out, "n_features": from, "n_components": to }),
+        || json!({ "out": args.out.display().to_string(), "n_features": from, "n_components": to }),
         || format!("{}: {from} features to {to} components", args.out.display()),
     )?;
     Ok(ExitCode::SUCCESS)

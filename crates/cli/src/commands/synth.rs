@@ -54,7 +54,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     args.told.tell(
         || {
             json!({
-                "out": out, "recordings": recordings, "seconds": seconds, "channels": 8,
+                "out": out.display().to_string(), "recordings": recordings, "seconds": seconds, "channels": 8,
                 "sample_rate": SAMPLE_RATE, "seed": seed, "synthetic": true,
             })
         },

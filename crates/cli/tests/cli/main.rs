@@ -30,6 +30,8 @@ mod onnx;
 mod options;
 #[cfg(feature = "nets")]
 mod pictures;
+#[cfg(unix)]
+mod processes;
 mod scoring;
 mod stores;
 #[cfg(feature = "nets")]

@@ -110,9 +110,9 @@ impl Plan {
                 Some(range) => range,
             };
             let Feature { kernel, raw_rows: rows, complex, finish, derived, .. } = feature;
+            warnings.extend(kernel.warning().map(|warning| format!("{name}: {warning}")));
             let extent = match kernel {
                 Kernel::Spectrum(params, quantity, kernel) => {
-                    warnings.extend(kernel.warning().map(|warning| format!("{name}: {warning}")));
                     let member = SpectrumMember { feature: index, rows, complex, quantity, kernel };
                     streams.spectrum(&params, member)?;
                     Extent::Frames(params.hop_length as f64)
@@ -268,5 +268,26 @@ impl Plan {
         let needed =
             |framing: Framing| framing.length.saturating_sub(2 * framing.pad).max(1) as u64;
         self.streams.iter().map(|s| needed(s.framing())).max().unwrap_or(1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Only features of shared spectra said so.
+    #[test]
+    fn empty_mel_filters_are_said_of_every_feature() {
+        for kind in ["melspectrogram", "mfcc", "pcen", "spectral_flux", "onset_strength"] {
+            let warnings = |n_fft: usize| {
+                let toml = format!("[features.{kind}]\nn_fft = {n_fft}\n");
+                let config = Arc::new(Config::with_overrides(&toml, "test", &[]).unwrap());
+                Plan::new(&config, 22_050.0, 1).unwrap().warnings().to_vec()
+            };
+            let said = warnings(256);
+            let expected = format!("{kind}: 20 of 128 mel filters are empty");
+            assert!(said.len() == 1 && said[0].starts_with(&expected), "{kind}: {said:?}");
+            assert!(warnings(2048).is_empty(), "{kind}");
+        }
     }
 }

@@ -123,18 +123,17 @@ impl Signal {
     /// Takes interleaved samples; a frame that is not whole is left out.
     ///
     /// # Errors
-    /// NaN or infinite samples.
+    /// NaN, infinite or huge samples: then none of them is taken.
     pub fn push(&mut self, samples: &[f32]) -> Result<(), SignalError> {
-        let whole = samples.len() / self.channels * self.channels;
-        for block in samples[..whole].chunks(self.step * self.channels) {
-            let frames = (block.len() / self.channels) as u64;
-            let begin = self.position;
-            self.position += frames;
-            let inside = |frame: u64| frame.clamp(begin, self.position) - begin;
-            let (from, to) = (inside(self.crop.start), inside(self.crop.end));
-            let block = &block[from as usize * self.channels..to as usize * self.channels];
-            let at = self.origin + begin + from;
-            check_samples(block, at, self.channels, |_| None)?;
+        let frames = samples.len() / self.channels;
+        let (begin, end) = (self.position, self.position + frames as u64);
+        let inside = |frame: u64| (frame.clamp(begin, end) - begin) as usize;
+        let (from, to) = (inside(self.crop.start), inside(self.crop.end));
+        let samples = &samples[from * self.channels..to * self.channels];
+        let at = self.origin + begin + from as u64;
+        check_samples(samples, at, self.channels, |_| None)?;
+        self.position = end;
+        for block in samples.chunks(self.step * self.channels) {
             self.front.push(block, &mut self.held);
             self.extractor.push(&self.held);
             self.held.clear();
@@ -190,6 +189,27 @@ mod tests {
                 samples.chunks(block).for_each(|block| signal.push(block).unwrap());
                 assert_eq!(rows(signal.finish().unwrap()), whole);
             }
+        }
+    }
+
+    /// What stood before the sample was kept, or the whole block used up the crop.
+    #[test]
+    fn a_refused_block_leaves_the_signal_as_it_was() {
+        for crop in [&[][..], &["signal.start=0.5", "signal.end=1.5"]] {
+            let overrides: Vec<String> = crop.iter().map(|s| s.to_string()).collect();
+            let toml = crate::config::Preset::find("esc26").unwrap().toml;
+            let config = Config::with_overrides(toml, "esc26", &overrides).unwrap();
+            let signals = Signals::new(Arc::new(config));
+            let good: Vec<f32> = (0..45_000_u32).map(|i| (i * i % 997) as f32 / 997.0).collect();
+            let mut bad = good.clone();
+            bad[30_000] = 1e13;
+            let computed = |refused: bool| {
+                let mut signal = signals.start(22_050, 1).unwrap();
+                assert!(!refused || signal.push(&bad).is_err());
+                signal.push(&good).unwrap();
+                rows(signal.finish().unwrap())
+            };
+            assert_eq!(computed(true), computed(false), "{crop:?}");
         }
     }
 

@@ -5,7 +5,7 @@ use corsmal_dsp::decibel::Decibel;
 use corsmal_dsp::mel::{MelParams, SparseBank, mel_filter};
 
 use super::kernel::{SlotFn, SlotKernel};
-use super::mel_bands::check_n_mels;
+use super::mel_bands::{check_n_mels, empty};
 use super::melspectrogram::quantity_of;
 
 /// `bank @ magnitude^power`, times a factor or in decibels without a clamp.
@@ -13,6 +13,7 @@ pub struct ExactMel {
     bank: SparseBank,
     squared: bool,
     unit: Unit,
+    empty: Option<String>,
 }
 
 /// Unit of the bands.
@@ -29,8 +30,9 @@ impl ExactMel {
     pub fn new(params: &MelParams, power: f64, unit: Unit) -> corsmal_dsp::Result<Self> {
         check_n_mels(params.n_mels)?;
         quantity_of(power)?;
-        let bank = SparseBank::new(&mel_filter(params)?);
-        Ok(Self { bank, squared: power == 2.0, unit })
+        let bank = mel_filter(params)?;
+        let empty = empty(&bank);
+        Ok(Self { bank: SparseBank::new(&bank), squared: power == 2.0, unit, empty })
     }
 }
 
@@ -50,5 +52,9 @@ impl SlotKernel for ExactMel {
                 };
             }
         })
+    }
+
+    fn warning(&self) -> Option<String> {
+        self.empty.clone()
     }
 }

@@ -43,6 +43,11 @@ pub type SlotFn<'k> = Box<dyn FnMut(&[f32], &mut [f64]) + 'k>;
 pub trait SlotKernel: Send + Sync {
     /// The function with its working memory, made once per block of frames.
     fn worker(&self) -> SlotFn<'_>;
+
+    /// As [`SpectrumKernel::warning`].
+    fn warning(&self) -> Option<String> {
+        None
+    }
 }
 
 /// Computes from a whole channel, which is held in memory until its end.
@@ -62,6 +67,11 @@ pub trait WholeKernel: Send + Sync {
     /// How many of the first of a signal's `frames` frames may be left out: the rest has the same values.
     fn unread(&self, _frames: u64) -> u64 {
         0
+    }
+
+    /// As [`SpectrumKernel::warning`].
+    fn warning(&self) -> Option<String> {
+        None
     }
 
     /// Bytes that computing takes for each sample of a channel, measured on long recordings.
@@ -104,6 +114,18 @@ pub enum Kernel {
     Whole(Extent, Box<dyn WholeKernel>),
     /// Nothing: [`Feature::derived`] reads the finished frames of an earlier feature, by name.
     Earlier(String),
+}
+
+impl Kernel {
+    /// What the user should know of its parameters, though they are possible.
+    pub fn warning(&self) -> Option<String> {
+        match self {
+            Self::Spectrum(.., kernel) => kernel.warning(),
+            Self::Exact(_, kernel) => kernel.warning(),
+            Self::Whole(_, kernel) => kernel.warning(),
+            Self::Wave(..) | Self::Earlier(_) => None,
+        }
+    }
 }
 
 /// Where the frames of a feature lie.

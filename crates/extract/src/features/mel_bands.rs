@@ -4,6 +4,8 @@ use corsmal_dsp::decibel::Decibel;
 use corsmal_dsp::lanes::{Row, power_to_decibel};
 use corsmal_dsp::mel::{MelParams, SparseBank, empty_filters, mel_filter};
 
+use ndarray::Array2;
+
 use super::kernel::{Finish, SpectrumKernel};
 use crate::params::{DbSpec, Scale, at_most};
 
@@ -29,7 +31,7 @@ pub struct MelKernel {
     bank: SparseBank,
     scale: Scale,
     db: Decibel,
-    empty: Vec<usize>,
+    empty: Option<String>,
 }
 
 /// More bands than any use has; bounds the memory of filter bank and cosine transform.
@@ -45,7 +47,7 @@ impl MelKernel {
     pub fn new(params: &MelParams, scale: Scale, db: Decibel) -> corsmal_dsp::Result<Self> {
         check_n_mels(params.n_mels)?;
         let bank = mel_filter(params)?;
-        Ok(Self { bank: SparseBank::new(&bank), scale, db, empty: empty_filters(&bank) })
+        Ok(Self { bank: SparseBank::new(&bank), scale, db, empty: empty(&bank) })
     }
 }
 
@@ -56,13 +58,19 @@ impl SpectrumKernel for MelKernel {
     }
 
     fn warning(&self) -> Option<String> {
-        let (first, last) = (self.empty.first()?, self.empty.last()?);
-        Some(format!(
-            "{} of {} mel filters are empty (between {first} and {last}): use fewer n_mels or a longer n_fft",
-            self.empty.len(),
-            self.bank.bands().len()
-        ))
+        self.empty.clone()
     }
+}
+
+/// That filters pass nothing, as librosa warns.
+pub fn empty(bank: &Array2<f32>) -> Option<String> {
+    let empty = empty_filters(bank);
+    let (first, last) = (empty.first()?, empty.last()?);
+    Some(format!(
+        "{} of {} mel filters are empty (between {first} and {last}): use fewer n_mels or a longer n_fft",
+        empty.len(),
+        bank.nrows()
+    ))
 }
 
 /// The reference of `"max"` and the `top_db` clamp.

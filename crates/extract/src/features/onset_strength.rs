@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::kernel::{Extent, Feature, WholeKernel};
 use super::kind::FeatureKind;
-use super::mel_bands::check_n_mels;
+use super::mel_bands::{check_n_mels, empty};
 use super::rise::{Rise, RiseSpec};
 use crate::params::Keys;
 
@@ -25,6 +25,7 @@ struct Envelope {
     stft: StftParams,
     bank: SparseBank,
     params: OnsetParams,
+    empty: Option<String>,
 }
 
 impl WholeKernel for Envelope {
@@ -37,6 +38,10 @@ impl WholeKernel for Envelope {
         let mut mel = self.bank.apply(power.view());
         Decibel::default().power(mel.as_slice_mut().expect("made in C order"))?;
         onset_strength(mel.view(), None, &self.params)
+    }
+
+    fn warning(&self) -> Option<String> {
+        self.empty.clone()
     }
 }
 
@@ -52,9 +57,10 @@ impl FeatureKind for OnsetStrength {
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let Rise { stft, mel, onset } = self.rise.params(sr)?;
         check_n_mels(mel.n_mels)?;
-        let bank = SparseBank::new(&mel_filter(&mel)?);
+        let bank = mel_filter(&mel)?;
         let extent = Extent::Frames(stft.hop_length as f64);
-        let kernel = Envelope { stft, bank, params: onset };
+        let empty = empty(&bank);
+        let kernel = Envelope { stft, bank: SparseBank::new(&bank), params: onset, empty };
         Ok(Feature::whole(extent, kernel, vec![String::new()]))
     }
 }

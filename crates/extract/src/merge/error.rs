@@ -38,6 +38,18 @@ pub enum MergeError {
         /// The output or its ledger.
         path: PathBuf,
     },
+    /// A merge is to be continued, but its result is there.
+    #[error("{path} is whole: no interrupted merge is left to continue; --overwrite merges again")]
+    Whole {
+        /// The output.
+        path: PathBuf,
+    },
+    /// Something that no file can replace is where the result is to be.
+    #[error("{path} exists and is not a regular file")]
+    NoFile {
+        /// What is there.
+        path: PathBuf,
+    },
     /// The result would take the place of a shard.
     #[error("{path} is one of the shards: give the merged output another name")]
     IsShard {

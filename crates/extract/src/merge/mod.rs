@@ -42,7 +42,8 @@ pub enum Existing {
 /// A shard whose arrays are in the result.
 #[derive(Debug, Serialize, Deserialize)]
 struct Merged {
-    shard: PathBuf,
+    /// Its path, in words.
+    shard: String,
     identity: String,
     entries: Vec<EntryRecord>,
 }
@@ -70,11 +71,14 @@ pub fn merge(
     if shards.iter().any(|shard| shard == out || draft::same(shard, out)) {
         return Err(MergeError::IsShard { path: out.clone() });
     }
+    if out.exists() && !out.is_file() {
+        return Err(MergeError::NoFile { path: out.clone() });
+    }
     let pending = Ledger::is_pending(out).then(|| ledger_path(out));
     let taken = if out.exists() { Some(out.clone()) } else { pending };
     match (taken, existing) {
         (Some(path), Existing::Keep) => return Err(MergeError::Exists { path }),
-        (Some(path), Existing::Resume) if path == *out => return Err(MergeError::Exists { path }),
+        (Some(path), Existing::Resume) if path == *out => return Err(MergeError::Whole { path }),
         _ => {}
     }
     let (shards, provenance) = in_order(shards, out, stop)?;
@@ -86,7 +90,9 @@ pub fn merge(
     let header = Header::new(&provenance, format_args!("merge of {}, {format}", shards.len()));
     let (ledger, done) = if existing == Existing::Resume {
         let same = |i: usize, done: &Merged| {
-            shards.get(i).is_some_and(|s| s.path == done.shard && s.identity == done.identity)
+            shards.get(i).is_some_and(|shard| {
+                shard.path.display().to_string() == done.shard && shard.identity == done.identity
+            })
         };
         let (ledger, resumed) = Ledger::resume(out, &header, same)?;
         (ledger, resumed.records)
@@ -165,7 +171,8 @@ impl Merge<'_> {
             }
             piece.require_same()?;
             let identity = piece.identity.clone();
-            self.ledger.append(&Merged { shard: shard.clone(), identity, entries })?;
+            let shard = shard.display().to_string();
+            self.ledger.append(&Merged { shard, identity, entries })?;
         }
         let table = joined.unwrap_or_default();
         match writer {
@@ -261,7 +268,7 @@ mod tests {
                 merge(&shards, &out, Existing::Resume, &GO).unwrap();
                 assert!(std::fs::read(&out).unwrap() == expected, "{compression:?}");
                 let there = merge(&shards, &out, Existing::Resume, &GO).unwrap_err();
-                assert!(there.to_string().contains("out.npz exists"), "{there}");
+                assert!(there.to_string().contains("out.npz is whole: no interrupted"), "{there}");
                 std::fs::remove_file(&out).unwrap();
             }
         }

@@ -32,7 +32,11 @@ pub fn merge(
         && existing != Existing::Overwrite
         && stored.is_there(stop)?
     {
-        return Err(MergeError::Exists { path: stored.name().into() });
+        let path = stored.name().into();
+        return Err(match existing {
+            Existing::Resume => MergeError::Whole { path },
+            _ => MergeError::Exists { path },
+        });
     }
     let is_any_stored = shards.iter().any(|shard| shard.to_str().is_some_and(is_stored));
     if let (None, false, Some(work)) = (&stored, is_any_stored, work) {

@@ -120,9 +120,7 @@ impl<'a> PartitionBy<'a> {
     /// A hidden folder beside the output, without what a killed run has left of the same kind: the lock of
     /// the ledger keeps other runs of this output away.
     fn beside(&self, out: &Path) -> io::Result<TempDir> {
-        let mut prefix = std::ffi::OsString::from(".");
-        prefix.push(out.file_name().unwrap_or_default());
-        prefix.push(".partitions-");
+        let prefix = draft::hidden(out, ".partitions-");
         for entry in draft::folder(out).read_dir()?.flatten() {
             let name = entry.file_name();
             let random = name.as_encoded_bytes().strip_prefix(prefix.as_encoded_bytes());

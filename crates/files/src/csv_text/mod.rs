@@ -41,7 +41,8 @@ pub fn reader<R: BufRead>(mut text: R) -> io::Result<csv::Reader<LineFeeds<R>>> 
     Ok(builder.delimiter(delimiter).from_reader(text))
 }
 
-/// The names of the columns, without white space around them.
+/// The names of the columns, without white space around them, but for what stands in quotation marks in the names of
+/// probabilities, `p_<label>`: there it belongs to the label.
 ///
 /// # Errors
 /// As those of records.
@@ -51,8 +52,14 @@ pub fn header<R: BufRead>(
     let header = reader.headers().cloned();
     match unclosed(reader) {
         Some(fault) => Err(fault),
-        None => Ok(header?.iter().map(str::trim).collect()),
+        None => Ok(header?.iter().map(name).collect()),
     }
+}
+
+/// The name of a column.
+fn name(field: &str) -> &str {
+    let bare = bare(field);
+    if bare.starts_with("p_") { bare } else { field.trim() }
 }
 
 /// That the record which was read last goes on to the end of the text, since a quotation mark in it is never
@@ -160,6 +167,14 @@ mod tests {
     use std::io::Read;
 
     use super::*;
+
+    /// The class `dog ` of a prediction file became another one.
+    #[test]
+    fn blanks_in_quotation_marks_belong_to_the_labels_of_probabilities() {
+        let mut table = reader(&b"id, \"type \" ,\"p_dog \", p_cat \n1,x,.5,.5\n"[..]).unwrap();
+        let names = header(&mut table).unwrap();
+        assert_eq!(names.iter().collect::<Vec<_>>(), ["id", "type", "p_dog ", "p_cat"]);
+    }
 
     #[test]
     fn text_of_older_encodings_is_refused_with_advice() {

@@ -277,7 +277,8 @@ impl LabelledTable {
                 "is empty: give it a value, or leave the recording out"
             } else if value.parse::<f64>().is_ok() && value.parse::<i128>().is_err() {
                 "is a decimal number, and no classifier learns numbers (classes are names or whole numbers): fit a regression on \
-                 corsmal_feat.load_features(FILE).summary in Python; score measures its estimates"
+                 corsmal_feat.load_features(FILE).summary in Python; score measures its estimates. If it is a name, such as \
+                 the code \"1e5\" of a machine, put a letter before it"
             } else {
                 continue;
             };

@@ -192,7 +192,7 @@ impl PredictionColumns {
         let class = match self.predicted.map(|at| (at, text(at))) {
             Some((_, UNKNOWN)) if !classes.contains_key(UNKNOWN) => None,
             None | Some((_, "")) => proba.as_deref().map(argmax),
-            // A column cannot be called with white space around the name.
+            // Other programs may leave the blanks out of the header.
             Some((at, name)) => match classes.get(name).or_else(|| classes.get(name.trim())) {
                 Some(class) => Some(*class),
                 None => {

@@ -86,17 +86,20 @@ fn measures(study: &Study) -> Option<Table> {
     })
 }
 
+/// Classes of the largest matrix that is drawn.
+const DRAWN: usize = 100;
+
 /// Which classes are taken for which.
 pub(super) fn confusion(study: &Study) -> Result<Option<Section>> {
     if study.confusion.is_empty() {
         return Ok(None);
     }
-    let plot = ConfusionMatrix {
+    let plot = (study.classes.len() <= DRAWN).then(|| ConfusionMatrix {
         title: format!("Confusion of {}", study.target),
         labels: study.classes.clone(),
         counts: study.confusion.clone(),
         f1: study.class_scores.iter().map(|c| c.f1).collect(),
-    };
+    });
     let row = |(name, scores): (&String, &content::ClassScore)| Row {
         source: Source::Ours,
         cells: vec![
@@ -113,12 +116,19 @@ pub(super) fn confusion(study: &Study) -> Result<Option<Section>> {
         columns: ["Class", "Precision", "Recall", "F1", "Rows"].map(String::from).to_vec(),
         rows: study.classes.iter().zip(&study.class_scores).map(row).collect(),
     };
+    let text = match plot {
+        Some(_) => "A cell's shade is its share of the true class.".into(),
+        None => format!("The matrix of more than {DRAWN} classes is not drawn."),
+    };
     let section = Section {
-        text: vec!["A cell's shade is its share of the true class.".into()],
+        text: vec![text],
         tables: vec![table],
         ..Section::new("confusion", "Class by class")
     };
-    Ok(Some(pictured(section, "confusion", &plot)?))
+    Ok(Some(match &plot {
+        Some(plot) => pictured(section, "confusion", plot)?,
+        None => section,
+    }))
 }
 
 /// Curves drawn in one plot: more could not be told apart.

@@ -138,13 +138,22 @@ fn detection(
     if !(0.0..=1.0).contains(&score) {
         return Err(format!("'{score}' is not a score from 0 to 1"));
     }
+    check_box(bounds)?;
+    Ok(Detection { frame, view, label, score, bounds, mask })
+}
+
+/// Refuses numbers that cannot be the left, top, right and bottom edge of a box.
+///
+/// # Errors
+/// Which, and why.
+pub fn check_box(bounds: [f64; 4]) -> std::result::Result<(), String> {
     if let Some(side) = bounds.iter().find(|side| side.is_nan() || side.abs() > 1e6) {
         return Err(format!("'{side}' is not an edge of a box in px"));
     }
     if bounds[0] > bounds[2] || bounds[1] > bounds[3] {
         return Err(format!("a box {bounds:?} whose right or lower edge comes first"));
     }
-    Ok(Detection { frame, view, label, score, bounds, mask })
+    Ok(())
 }
 
 #[cfg(test)]

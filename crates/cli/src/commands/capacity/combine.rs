@@ -43,7 +43,7 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
     publish::spare(&args.out, args.inputs.iter().map(PathBuf::as_path))?;
     let (rows, without) = combine_files(&args.inputs, args.prior, &args.out)?;
     args.told.tell(
-        || json!({ "out": args.out, "recordings": rows, "prior": without }),
+        || json!({ "out": args.out.display().to_string(), "recordings": rows, "prior": without }),
         || format!("{}: {rows} recordings, {without} with the prior", args.out.display()),
     )?;
     Ok(ExitCode::SUCCESS)

@@ -178,7 +178,7 @@ fn estimate(args: Estimate) -> Result<ExitCode, Failure> {
     args.told.tell(
         || {
             json!({
-                "out": out, "recordings": recordings, "measured": measured, "prior": prior,
+                "out": out.display().to_string(), "recordings": recordings, "measured": measured, "prior": prior,
                 "without_estimate": none, "failed": failed,
             })
         },

@@ -104,7 +104,7 @@ pub(super) fn train(args: Args) -> Result<ExitCode, Failure> {
     let used = regions.len();
     if args.told.json {
         let summary = json!({
-            "out": args.out, "recordings": recordings, "used": used, "failed": failed.len(),
+            "out": args.out.display().to_string(), "recordings": recordings, "used": used, "failed": failed.len(),
             "synthetic": synthetic,
         });
         println!("{}", serde_json::to_string_pretty(&summary)?);

@@ -39,7 +39,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let used = &model.provenance["with_container"];
     if args.told.json {
         let summary = json!({
-            "out": args.out, "recordings": recordings, "used": used, "failed": failed.len(),
+            "out": args.out.display().to_string(), "recordings": recordings, "used": used, "failed": failed.len(),
             "synthetic": model.provenance["synthetic"],
         });
         println!("{}", serde_json::to_string_pretty(&summary)?);

@@ -111,6 +111,12 @@ impl Args {
         if self.paths.is_empty() { &self.inputs } else { &self.paths }
     }
 
+    /// Whether the only recording is a stream, which may never end by itself.
+    pub(super) fn is_stream(&self) -> bool {
+        let is_open = |path: &Path| path.metadata().is_ok_and(|m| !m.is_file() && !m.is_dir());
+        matches!(self.names(), [only] if only == "-" || is_open(Path::new(only)))
+    }
+
     /// A writer for records about `unit`s with these label columns.
     pub(super) fn records(
         &self,

@@ -17,7 +17,7 @@ pub use args::Args;
 
 use super::nets::is_model;
 use crate::failure::{FAILED_FILES, Failure, INTERRUPTED};
-use crate::output::is_stdout;
+use crate::output::{is_delivered, is_stdout};
 use crate::publish;
 use records::{End, Records};
 
@@ -70,7 +70,8 @@ fn finish(
     let (written, failed) = (records.written, records.failed);
     match end {
         End::Unread => return Ok(ExitCode::SUCCESS),
-        End::Interrupted if written == 0 => {
+        // A table of a part of the recordings would look like a whole one.
+        End::Interrupted if written == 0 || !(is_delivered(&args.out) || args.is_stream()) => {
             eprintln!("interrupted; nothing was written");
             return Ok(ExitCode::from(INTERRUPTED));
         }

@@ -61,7 +61,7 @@ pub fn run(args: &Args, model: &NetModel) -> Result<(End, Option<Records>), Fail
         (true, Some(_)) => Unit::Vote,
     };
     let windowing = args.windowing()?;
-    if let Some(window) = args.window.filter(|_| !listener.takes_windows() && !args.quiet) {
+    if let Some(window) = args.window.filter(|_| !listener.takes_windows()) {
         eprintln!(
             "warning: {} was trained on whole recordings: it may do worse on windows of {window} s",
             model.header.network

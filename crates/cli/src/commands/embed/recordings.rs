@@ -41,7 +41,7 @@ pub fn run(args: &Args, weights: &Path) -> Result<ExitCode, Failure> {
     dataset.write_sequences(&args.out, width, &embedder.provenance(&found).to_string())?;
     let out = &args.out;
     args.told.tell(
-        || json!({ "out": out, "recordings": recordings, "rows": rows, "width": width, "failed": failed }),
+        || json!({ "out": out.display().to_string(), "recordings": recordings, "rows": rows, "width": width, "failed": failed }),
         || format!("{}: {recordings} recordings, {rows} x {width}", out.display()),
     )?;
     Ok(if failed > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })

@@ -43,7 +43,9 @@ pub fn run(args: &Args, data: &Path, model: &Path, library: &Path) -> Result<Exi
                 eprintln!("{id}: {reason}");
                 failed += 1;
             }
-            Err(Fault::Model(error)) => return Err(error.into()),
+            Err(Fault::Model(view, error)) => {
+                return Err(Failure::new(format!("{id}, view {view}: {error}")));
+            }
             Err(Fault::Interrupted) => {
                 eprintln!("interrupted; nothing was written");
                 return Ok(ExitCode::from(INTERRUPTED));
@@ -84,7 +86,7 @@ pub fn run(args: &Args, data: &Path, model: &Path, library: &Path) -> Result<Exi
     dataset.write_sequences(&args.out, FEATURES, &about.to_string())?;
     let out = &args.out;
     args.told.tell(
-        || json!({ "out": out, "recordings": recordings, "rows": rows, "width": FEATURES, "failed": failed }),
+        || json!({ "out": out.display().to_string(), "recordings": recordings, "rows": rows, "width": FEATURES, "failed": failed }),
         || format!("{}: {recordings} recordings, {rows} x {FEATURES}", out.display()),
     )?;
     Ok(if failed > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
@@ -93,7 +95,7 @@ pub fn run(args: &Args, data: &Path, model: &Path, library: &Path) -> Result<Exi
 /// What ends the work on a recording, or on all.
 enum Fault {
     Recording(String),
-    Model(OnnxError),
+    Model(u8, OnnxError),
     Interrupted,
 }
 
@@ -122,7 +124,8 @@ fn sequences(embedder: &mut ClipEmbedder, views: &Views) -> Result<Vec<Vec<f32>>
             let Some((_, Some(image))) = reader.next(|_| true)? else { break };
             window.push(clip::frame(&image));
             if window.len() == FRAMES {
-                sequence.extend(embedder.embed(&clip::window(&window)).map_err(Fault::Model)?);
+                let embedded = embedder.embed(&clip::window(&window));
+                sequence.extend(embedded.map_err(|error| Fault::Model(view, error))?);
                 window.clear();
             }
         }

@@ -111,7 +111,7 @@ impl Args {
     ) -> Result<(), Failure> {
         let out = &self.out;
         if self.told.json {
-            let mut value = json!({ "out": out, "recordings": recordings, "failed": failed });
+            let mut value = json!({ "out": out.display().to_string(), "recordings": recordings, "failed": failed });
             if let [_, _, ..] = lacking {
                 value["without"] = lacking.iter().map(|&(what, n)| (what, n)).collect();
             }
