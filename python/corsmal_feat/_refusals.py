@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import itertools
 import os
+import re
 import reprlib
 import types
 from collections.abc import Callable, Iterable, Mapping
@@ -158,7 +159,7 @@ def existing(path: Any) -> str:
     try:
         os.stat(name)
     except OSError as error:
-        if "://" in name:
+        if re.match(r"[A-Za-z][A-Za-z0-9+-]+://", name):
             told = f"{name}: this reads files on a disk: copy it to one (extract reads stores)"
             raise MissingFileError(told) from error
         raise of_file(error) from error

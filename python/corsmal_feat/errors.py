@@ -68,7 +68,8 @@ class FileError(RunError, OSError):
     def __reduce__(self) -> tuple[Any, ...]:
         # An OSError gets these of its arguments alone.
         kept = ("errno", "strerror", "filename")
-        return type(self), self.args, {name: getattr(self, name) for name in kept}
+        state = {name: getattr(self, name) for name in kept} | self.__dict__
+        return type(self), self.args, state
 
 
 class MissingFileError(FileError, DecodeError, FileNotFoundError):

@@ -1,11 +1,10 @@
 //! What the vision baseline sees: the container in the last frame of a view, cut out.
 
-use std::fs::File;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
 
 use corsmal_files::draft;
+use corsmal_files::workplace::{self, Workplace};
 use corsmal_vision::{Detection, Rgb};
 
 use crate::capacity::{Problem, Views, each, key, require_colours, require_own_tables, training};
@@ -18,7 +17,7 @@ pub const LABELS: [&str; 2] = ["cup", "wine glass"];
 /// What the label of an opaque container is, of level and type.
 pub const OPAQUE: &str = "opaque";
 /// How the name of the folder begins in which pictures wait.
-const HIDDEN: &[u8] = b".crops-";
+const HIDDEN: &str = ".crops-";
 /// Table of labels among the pictures of [`write()`].
 pub const LABEL_FILE: &str = "labels.csv";
 
@@ -93,7 +92,8 @@ pub fn write(
     std::fs::create_dir_all(out).map_err(io)?;
     // Pictures without their labels would look like a finished folder: they wait in a hidden one.
     let visible = |entry: &std::io::Result<std::fs::DirEntry>| {
-        let left = |e: &std::fs::DirEntry| e.file_name().as_encoded_bytes().starts_with(HIDDEN);
+        let left =
+            |e: &std::fs::DirEntry| e.file_name().as_encoded_bytes().starts_with(HIDDEN.as_bytes());
         !entry.as_ref().is_ok_and(left)
     };
     if std::fs::read_dir(out).map_err(io)?.any(|entry| visible(&entry)) {
@@ -102,34 +102,16 @@ pub fn write(
             out.display()
         )));
     }
-    let prefix = std::str::from_utf8(HIDDEN).unwrap_or_default();
-    remove_left(out);
-    let hidden = tempfile::Builder::new().prefix(prefix).tempdir_in(out).map_err(io)?;
-    // Where a file system knows no locks, others cannot lock it either and leave it alone.
-    let lock = File::open(hidden.path()).inspect(|folder| drop(folder.try_lock()));
+    let hidden = Workplace::create(out, HIDDEN).map_err(io)?;
     let written = write_into(data, detections, (out, hidden.path()), jobs, interrupted);
-    drop((hidden, lock));
+    drop(hidden);
+    // What was too young to be told from that of a living process.
+    workplace::remove_left(out, HIDDEN);
     if written.is_err() && created {
         // Empty, or not ours to remove.
         let _ = std::fs::remove_dir(out);
     }
     written
-}
-
-/// Removes the hidden folders that killed processes have left; those of living ones are locked.
-fn remove_left(out: &Path) {
-    for entry in std::fs::read_dir(out).into_iter().flatten().flatten() {
-        let left = |folder: File| {
-            // A new one may be about to be locked.
-            let modified = folder.metadata().and_then(|meta| meta.modified());
-            let age = modified.map(|modified| modified.elapsed().unwrap_or_default());
-            age.is_ok_and(|age| age > Duration::from_secs(10)) && folder.try_lock().is_ok()
-        };
-        let is_ours = entry.file_name().as_encoded_bytes().starts_with(HIDDEN);
-        if is_ours && File::open(entry.path()).is_ok_and(left) {
-            let _ = std::fs::remove_dir_all(entry.path());
-        }
-    }
 }
 
 /// Writes into a hidden folder, then moves all into `out`.

@@ -6,6 +6,25 @@ use corsmal_files::draft::{check_place, folder, is_device, same};
 
 use crate::failure::Failure;
 
+/// Refuses what no file or folder on a disk is called: standard output, and addresses.
+pub fn require_disk(path: &Path) -> Result<(), Failure> {
+    if path == Path::new("-") {
+        return Err(Failure::new(
+            "-: this output is not written to standard output: give a name (./- for one called so)",
+        ));
+    }
+    // Not a drive.
+    let is_scheme = |scheme: &str| scheme.len() > 1 && !scheme.contains(['/', '.', ' ']);
+    let scheme = path.to_str().and_then(|name| name.split_once("://"));
+    if scheme.is_some_and(|(scheme, _)| is_scheme(scheme)) && !path.exists() {
+        return Err(Failure::new(format!(
+            "{}: this output is written to a disk: give a name there, and copy it when it is whole",
+            path.display()
+        )));
+    }
+    Ok(())
+}
+
 /// As [`check`] for a table, which a device takes as well.
 pub fn check_table(path: &Path, overwrite: bool) -> Result<(), Failure> {
     match is_device(path) {
@@ -17,17 +36,7 @@ pub fn check_table(path: &Path, overwrite: bool) -> Result<(), Failure> {
 /// Refuses a name that is taken, unless it is of a file that may be replaced, and a folder that is
 /// not there or takes no files.
 pub fn check(path: &Path, overwrite: bool) -> Result<(), Failure> {
-    if path == Path::new("-") {
-        return Err(Failure::new(
-            "-: this output is not written to standard output: name a file (./- for one called so)",
-        ));
-    }
-    if path.to_str().is_some_and(|name| name.contains("://")) && !path.exists() {
-        return Err(Failure::new(format!(
-            "{}: this output is written to a disk: name a file, and copy it when it is whole",
-            path.display()
-        )));
-    }
+    require_disk(path)?;
     if is_device(path) {
         return Err(Failure::new(format!(
             "{} is a device; this output gets its name when it is whole: name a file",

@@ -12,8 +12,10 @@ use tempfile::NamedTempFile;
 
 /// What the name of a draft begins with after the name of the file that it is to become.
 const SUFFIX: &str = ".unfinished-";
-/// As many bytes of that name: a name that a system allows (255 bytes) has room for no more.
+/// Longest name that stands whole in that of a draft: names of up to 255 bytes are allowed.
 const NAMED: usize = 200;
+/// How long a file or folder without a lock may be about to be locked.
+const YOUNG: Duration = Duration::from_secs(10);
 
 /// A file under another name in the same folder, `.NAME.unfinished-XXXXXX`, until it is whole. Errors
 /// name the file it is to become.
@@ -96,16 +98,20 @@ fn remove_left(folder: &Path) {
         let hidden = name.strip_prefix('.').and_then(|name| name.rsplit_once(SUFFIX));
         let Some((_, random)) = hidden else { continue };
         let ours = random.len() == 6 && random.bytes().all(|byte| byte.is_ascii_alphanumeric());
-        let left = |file: File| {
-            // A new one may be about to be locked.
-            let modified = file.metadata().and_then(|meta| meta.modified());
-            let age = modified.map(|modified| modified.elapsed().unwrap_or_default());
-            age.is_ok_and(|age| age > Duration::from_secs(10)) && file.try_lock().is_ok()
-        };
-        if ours && File::open(entry.path()).is_ok_and(left) {
+        if ours && is_left(&entry.path()) {
             let _ = std::fs::remove_file(entry.path());
         }
     }
+}
+
+/// Whether no living process holds the lock of a file or folder.
+pub(crate) fn is_left(path: &Path) -> bool {
+    let left = |file: File| {
+        let modified = file.metadata().and_then(|meta| meta.modified());
+        let age = modified.map(|modified| modified.elapsed().unwrap_or_default());
+        age.is_ok_and(|age| age > YOUNG) && file.try_lock().is_ok()
+    };
+    File::open(path).is_ok_and(left)
 }
 
 /// Whether a path leads to a device that takes a stream of bytes, such as `/dev/null`: nothing is made beside it,
@@ -163,14 +169,16 @@ pub fn folder(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// What the name of something begins with that is beside a file for some time: `.NAME` and a suffix.
+/// What the name of something begins with that is beside a file for some time: `.NAME` and a suffix. Of a long name
+/// it has the beginning and a hash of the whole.
 pub fn hidden(path: &Path, suffix: &str) -> OsString {
     let name = path.file_name().unwrap_or_default();
     let mut prefix = OsString::from(".");
     match name.len() > NAMED {
         true => {
+            let whole = crc32fast::hash(name.as_encoded_bytes());
             let name = name.to_string_lossy();
-            prefix.push(&name[..name.floor_char_boundary(NAMED)]);
+            prefix.push(format!("{}~{whole:08x}", &name[..name.floor_char_boundary(NAMED)]));
         }
         false => prefix.push(name),
     }
@@ -178,7 +186,8 @@ pub fn hidden(path: &Path, suffix: &str) -> OsString {
     prefix
 }
 
-/// Refuses the name of a folder, a name that the system does not allow, and a path in whose folder no file can be made. What it makes to find out is gone
+/// Refuses the name of a folder, a name that the system does not allow, and a path in whose folder no file can be
+/// made. What it makes to find out is gone
 /// again.
 ///
 /// # Errors
@@ -263,8 +272,13 @@ mod tests {
             write(&path, b"all").unwrap();
             assert_eq!(std::fs::read(&path).unwrap(), b"all");
         }
-        let longer = folder.path().join("n".repeat(256));
-        assert!(check_place(&longer).unwrap_err().to_string().contains("too long"));
+        #[cfg(unix)]
+        {
+            let longer = folder.path().join("n".repeat(256));
+            assert!(check_place(&longer).unwrap_err().to_string().contains("too long"));
+        }
+        let prefix = |end: &str| hidden(Path::new(&("n".repeat(210) + end)), SUFFIX);
+        assert_ne!(prefix("a"), prefix("b"), "one is not taken for what the other has left");
     }
 
     #[test]

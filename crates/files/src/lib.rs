@@ -59,3 +59,4 @@ pub mod shield;
 pub mod spelling;
 pub mod statistic;
 pub mod table;
+pub mod workplace;

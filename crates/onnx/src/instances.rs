@@ -56,12 +56,12 @@ impl Instances<'_> {
         let mut rows = Vec::new();
         for i in 0..count {
             let (bounds, certain) = (self.boxes[i], self.scores[i]);
-            if !(0.0..=1.0).contains(&certain) {
-                return Err(format!("detection {i}: '{certain}' is not a score from 0 to 1"));
+            if !(0.0..=1.0).contains(&certain) || !bounds.iter().all(|edge| edge.is_finite()) {
+                return Err(format!("detection {i}: score {certain}, box {bounds:?}"));
             }
-            check_box(bounds.map(f64::from)).map_err(|why| format!("detection {i}: {why}"))?;
             let name = u8::try_from(self.labels[i]).ok().and_then(category_name);
             let Some(name) = name.filter(|_| certain >= score) else { continue };
+            check_box(bounds.map(f64::from)).map_err(|why| format!("detection {i}: {why}"))?;
             let mut row = json!({
                 "frame": frame, "view": view, "label": name, "score": certain, "box": bounds,
             });
@@ -133,12 +133,16 @@ mod tests {
         for (bounds, why) in [
             ([558.0, 559.0, 68.0, 68.0], "right or lower edge comes first"),
             ([0.0, 0.0, 2e6, 2.0], "'2000000' is not an edge"),
-            ([0.0, 0.0, f32::INFINITY, 2.0], "'inf' is not an edge"),
+            ([0.0, 0.0, f32::INFINITY, 2.0], "box [0.0, 0.0, inf, 2.0]"),
         ] {
             let boxes = [bounds, bounds, bounds, bounds];
             let said = Instances { boxes: &boxes, ..found }.rows((3, 7), (2, 2), 0.25);
             assert!(said.unwrap_err().contains(why), "{bounds:?}");
         }
+        // Of what is not written, only the numbers are looked at.
+        let boxes = [found.boxes[0], found.boxes[1], [2.0, 0.0, 1.0, 0.0], [2.0, 0.0, 1.0, 0.0]];
+        let rows = Instances { boxes: &boxes, ..found }.rows((3, 7), (2, 2), 0.25).unwrap();
+        assert_eq!(rows.len(), 2);
         let fewer = Instances { labels: &found.labels[..3], ..found };
         assert!(fewer.rows((3, 7), (2, 2), 0.25).unwrap_err().contains("3 labels"));
     }

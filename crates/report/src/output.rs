@@ -49,7 +49,6 @@ impl Report {
             Ok::<_, ReportError>(path)
         };
         let [tables, figures] = FOLDERS;
-        let places = [folder(tables)?, folder(figures)?];
         // What another report left here would pass as part of this one.
         let page = dir.join(PAGE);
         for path in earlier(dir).into_iter().map(|name| dir.join(name)).chain([page.clone()]) {
@@ -71,6 +70,7 @@ impl Report {
         let put = |path: &Path, bytes: &[u8]| draft::write(path, bytes).map_err(ReportError::Write);
         // First, so that the next report removes what this one leaves if it breaks off.
         put(&dir.join(DOCUMENT), document.as_bytes())?;
+        let places = [folder(tables)?, folder(figures)?];
         let mut rows = shown.clone().flat_map(|t| &t.rows);
         let mixed = rows.any(|row| row.source != Source::Ours);
         for table in shown {

@@ -1,6 +1,7 @@
 //! Clients of stores, one for each bucket.
 
 use std::collections::HashMap;
+use std::str::FromStr;
 use std::sync::{Arc, Mutex, Once};
 use std::time::Duration;
 
@@ -56,14 +57,29 @@ fn connect(uri: &Uri) -> Result<Arc<dyn ObjectStore>, StoreError> {
     let store: Arc<dyn ObjectStore> = match uri.scheme {
         Scheme::S3 => Arc::new(amazon(uri)?.build().map_err(setup)?),
         Scheme::Google => {
-            let mut builder = GoogleCloudStorageBuilder::from_env().with_bucket_name(uri.bucket());
+            let mut builder = GoogleCloudStorageBuilder::new().with_bucket_name(uri.bucket());
+            if let Some(path) = std::env::var("SERVICE_ACCOUNT").ok().filter(|p| !p.is_empty()) {
+                builder = builder.with_service_account_path(path);
+            }
+            for (key, value) in environment("GOOGLE_")? {
+                builder = builder.with_config(key, value);
+            }
             for (key, value) in TIMES {
                 builder = builder.with_config(GoogleConfigKey::Client(key), value);
             }
             Arc::new(builder.with_retry(retry()).build().map_err(setup)?)
         }
         Scheme::Azure => {
-            let mut builder = MicrosoftAzureBuilder::from_env().with_url(uri.root());
+            let mut builder = MicrosoftAzureBuilder::new().with_url(uri.root());
+            for (key, value) in environment("AZURE_")? {
+                builder = builder.with_config(key, value);
+            }
+            if let Some(to) = std::env::var("IDENTITY_ENDPOINT").ok().filter(|to| !to.is_empty()) {
+                builder = builder.with_msi_endpoint(to);
+            }
+            if let Some(address) = builder.get_config_value(&AzureConfigKey::Endpoint) {
+                require_address("AZURE_STORAGE_ENDPOINT", &address)?;
+            }
             for (key, value) in TIMES {
                 builder = builder.with_config(AzureConfigKey::Client(key), value);
             }
@@ -77,7 +93,7 @@ fn connect(uri: &Uri) -> Result<Arc<dyn ObjectStore>, StoreError> {
 fn amazon(uri: &Uri) -> Result<AmazonS3Builder, StoreError> {
     use AmazonS3ConfigKey as Key;
     let mut builder = AmazonS3Builder::new().with_bucket_name(uri.bucket()).with_retry(retry());
-    for (key, value) in environment()? {
+    for (key, value) in environment("AWS_")? {
         builder = builder.with_config(key, value);
     }
     let set = |builder: &AmazonS3Builder, key| builder.get_config_value(&key).is_some();
@@ -98,11 +114,17 @@ fn amazon(uri: &Uri) -> Result<AmazonS3Builder, StoreError> {
     }
     let endpoint = [Key::S3Endpoint, Key::Endpoint].map(|key| builder.get_config_value(&key));
     if let Some(endpoint) = endpoint.iter().flatten().next() {
-        require_address(endpoint)?;
+        require_address("AWS_ENDPOINT_URL, or endpoint_url of the profile,", endpoint)?;
         // Whoever names an endpoint without encryption wants it.
         if endpoint.starts_with("http://") {
             builder = builder.with_config(Key::Client(ClientConfigKey::AllowHttp), "true");
         }
+    }
+    let region = builder.get_config_value(&Key::Region).unwrap_or_default();
+    if !region.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)) {
+        return Err(StoreError::Setup(format!(
+            "AWS_REGION, or region of the profile, must be a name such as us-east-1, not {region:?}"
+        )));
     }
     for (key, value) in TIMES {
         builder = builder.with_config(Key::Client(key), value);
@@ -110,17 +132,19 @@ fn amazon(uri: &Uri) -> Result<AmazonS3Builder, StoreError> {
     Ok(builder)
 }
 
-/// What the environment says of S3. Variables without a value count as absent, as AWS's own tools have it.
+/// Settings of a store in the environment, whose names begin with `prefix`. Variables without a value count as absent,
+/// as AWS's own tools have it.
 ///
 /// # Errors
 /// A value that no request can carry: the client panics at it.
-fn environment() -> Result<Vec<(AmazonS3ConfigKey, String)>, StoreError> {
+fn environment<K: FromStr>(prefix: &str) -> Result<Vec<(K, String)>, StoreError> {
     let mut found = Vec::new();
     for (name, value) in std::env::vars_os() {
         let (Some(name), Some(value)) = (name.to_str(), value.to_str()) else { continue };
-        let key = name.starts_with("AWS_").then(|| name.to_ascii_lowercase().parse().ok());
+        let key = name.starts_with(prefix).then(|| name.to_ascii_lowercase().parse().ok());
         let Some(key) = key.flatten().filter(|_| !value.is_empty()) else { continue };
-        if value.contains(char::is_control) {
+        // A key of Google's is a JSON text.
+        if value.contains(char::is_control) && !value.trim_start().starts_with('{') {
             return Err(StoreError::Setup(format!(
                 "{name} holds a control character, such as a line feed at its end: set it without"
             )));
@@ -131,20 +155,14 @@ fn environment() -> Result<Vec<(AmazonS3ConfigKey, String)>, StoreError> {
 }
 
 /// Refuses an endpoint that is no address: the client panics at it. It may hold a password, which nothing shows.
-fn require_address(endpoint: &str) -> Result<(), StoreError> {
-    let host = ["http://", "https://"].iter().find_map(|scheme| endpoint.strip_prefix(scheme));
-    let is_host = |host: &str| {
-        !host.is_empty()
-            && !host.starts_with('/')
-            && !host.contains([' ', '\t', '\\', '<', '>', '"'])
-    };
-    match host.is_some_and(is_host) {
+fn require_address(named_by: &str, endpoint: &str) -> Result<(), StoreError> {
+    let has_host = |uri: http::Uri| uri.host().is_some_and(|host| !host.is_empty());
+    let is_url = reqwest::Url::parse(endpoint).is_ok_and(|url| url.scheme().starts_with("http"));
+    match is_url && endpoint.parse().is_ok_and(has_host) {
         true => Ok(()),
-        false => Err(StoreError::Setup(
-            "AWS_ENDPOINT_URL, or endpoint_url of the profile, must be an address with http:// or https://, such as \
-             http://localhost:9000"
-                .into(),
-        )),
+        false => Err(StoreError::Setup(format!(
+            "{named_by} must be an address with http:// or https://, such as http://localhost:9000"
+        ))),
     }
 }
 
@@ -225,11 +243,23 @@ mod tests {
     #[test]
     fn endpoints_are_addresses() {
         for good in ["http://localhost:9000", "https://s3.example.org/", "http://[::1]:5000"] {
-            assert_eq!(require_address(good), Ok(()), "{good}");
+            assert_eq!(require_address("X", good), Ok(()), "{good}");
         }
-        for bad in ["localhost:9000", "", "http://", "http:///x", "http://my host", "ftp://host"] {
-            let said = require_address(bad).unwrap_err().to_string();
-            assert!(said.contains("AWS_ENDPOINT_URL") && said.contains("http://"), "{bad}: {said}");
+        for bad in [
+            "localhost:9000",
+            "",
+            "http://",
+            "http://my host",
+            "ftp://host",
+            "http://[",
+            "http://h:99999",
+            "http://a%zz",
+            "http://\u{e9}",
+            "http://a|b",
+            "http://?",
+        ] {
+            let said = require_address("X", bad).unwrap_err().to_string();
+            assert!(said.starts_with("X must be an address with http://"), "{bad}: {said}");
         }
     }
 }

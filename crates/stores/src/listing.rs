@@ -1,6 +1,7 @@
 //! Which objects there are.
 
 use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
 
 use futures_util::TryStreamExt;
 
@@ -10,8 +11,9 @@ use crate::object::{Object, Version};
 use crate::runtime;
 use crate::uri::{Scheme, Uri};
 
-/// How often a listing is asked for again.
+/// How often a listing is asked for again, and how long after it was asked for first.
 const MORE: u32 = 2;
+const WITHIN: Duration = Duration::from_secs(10);
 
 /// All objects below a folder, at any depth, sorted by the bytes of their keys. Waiting ends when `stop`
 /// is set.
@@ -26,15 +28,15 @@ pub fn list(folder: &Uri, stop: &AtomicBool) -> Result<Vec<Object>, StoreError> 
     }
     let (store, path) = (connect::store(folder)?, folder.path()?);
     let prefix = (!path.is_root()).then_some(path);
-    let mut tries = 0;
+    let (mut tries, begin) = (0, Instant::now());
     let found = loop {
         let (store, prefix) = (store.clone(), prefix.clone());
         let listing = runtime::spawn(async move {
             store.list(prefix.as_ref()).try_collect::<Vec<_>>().await.map_err(StoreError::from)
         });
         match runtime::wait(&listing, stop)? {
-            // The client does not ask again for a page that broke off.
-            Err(error) if error.is_worth_another_try() && tries < MORE => tries += 1,
+            // The client asks again by itself where it got no answer, but not for a page that broke off.
+            Err(StoreError::Failed(_)) if tries < MORE && begin.elapsed() < WITHIN => tries += 1,
             found => break found?,
         }
     };

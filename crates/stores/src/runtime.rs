@@ -119,7 +119,10 @@ pub(crate) fn wait<T>(coming: &Coming<T>, stop: &AtomicBool) -> Result<T, StoreE
                 }
             }
             Err(RecvTimeoutError::Disconnected) => {
-                return Err(StoreError::Failed("the request ended without a response".into()));
+                return Err(StoreError::Setup(
+                    "the client of the store failed: is a setting (AWS_*, AZURE_*, GOOGLE_*) one that no request can carry?"
+                        .into(),
+                ));
             }
         }
     }

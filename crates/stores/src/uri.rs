@@ -83,7 +83,9 @@ impl Uri {
                 reason: "must not contain a user name, password or port".into(),
             });
         }
-        let allowed = |c: char| c.is_ascii_alphanumeric() || "._-@".contains(c);
+        // Azure's own containers are called `$web`.
+        let marks = if is_account { "._-@$" } else { "._-" };
+        let allowed = |c: char| c.is_ascii_alphanumeric() || marks.contains(c);
         if let Some(other) = bucket.chars().find(|c| scheme != Scheme::Web && !allowed(*c)) {
             return Err(wrong(format!("has {other:?} in its bucket, which no store allows")));
         }
@@ -225,6 +227,12 @@ mod tests {
             let error = Uri::parse(name).unwrap_err();
             assert!(!format!("{error} {error:?}").contains("secret"), "{error:?}");
         }
+    }
+
+    #[test]
+    fn azure_has_containers_of_its_own() {
+        assert_eq!(Uri::parse("az://$web/x.wav").unwrap().bucket(), "$web");
+        assert!(Uri::parse("s3://$web/x.wav").is_err());
     }
 
     #[test]

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::container::{Container, Subset};
 use super::layout::DataSet;
 use super::name::SequenceName;
-use super::oddity::Oddity;
+use super::oddity::{Oddity, all_in_words, in_words, perhaps_in_words};
 
 /// Shortest and longest recording of the real data set, in seconds, with room.
 const DURATION_S: std::ops::RangeInclusive<f64> = 0.9..=200.0;
@@ -17,6 +17,7 @@ const DURATION_S: std::ops::RangeInclusive<f64> = 0.9..=200.0;
 #[derive(Debug, Serialize)]
 pub struct Findings {
     /// The folder.
+    #[serde(serialize_with = "in_words")]
     pub root: PathBuf,
     /// Made by `corsmal-feat synth`.
     pub synthetic: bool,
@@ -31,8 +32,10 @@ pub struct Findings {
     /// Flat test files, which belong to no known container.
     pub unplaced: usize,
     /// Annotation files.
+    #[serde(serialize_with = "all_in_words")]
     pub annotations: Vec<PathBuf>,
     /// Manual action annotations.
+    #[serde(serialize_with = "perhaps_in_words")]
     pub actions: Option<PathBuf>,
     /// Total duration in seconds.
     pub seconds: f64,

@@ -243,6 +243,7 @@ fn systems(args: &Args) -> Result<Vec<Box<dyn System>>, Failure> {
 
 /// Runs baselines and systems and writes the report.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
+    crate::publish::require_disk(&args.out)?;
     let systems = systems(&args)?;
     let baselines = match (args.baselines.is_empty(), systems.is_empty()) {
         (true, true) => Baseline::all(),

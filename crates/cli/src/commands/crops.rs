@@ -47,6 +47,7 @@ pub struct Args {
 /// Writes the pictures.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let Args { data, detections, out, jobs, told } = args;
+    crate::publish::require_disk(&out)?;
     let stop = crate::interrupt::flag();
     if let Some(doubt) = doubtful_colours(&DataSet::open(&data)?.recordings) {
         eprintln!("warning: {doubt}");

@@ -42,6 +42,7 @@ pub struct Args {
 
 /// Writes the data set and says what it is.
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
+    crate::publish::require_disk(&args.out)?;
     let size = match (args.small, args.full) {
         (true, _) => Size::Small,
         (_, true) => Size::Full,

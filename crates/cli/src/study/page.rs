@@ -6,13 +6,19 @@ use corsmal_files::identity;
 use corsmal_report::{Fact, Report};
 
 use crate::failure::Failure;
-use crate::made;
+use crate::{made, publish};
 
 /// Makes the folder of a report before anything is computed for it. Refuses a folder that holds
 /// something else, and a report that may not be replaced.
 pub fn prepare(folder: &Path, overwrite: bool) -> Result<(), Failure> {
     let refuse = |why: &str| Err(Failure::new(format!("--report {}: {why}", folder.display())));
-    if std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some()) {
+    publish::require_disk(folder)?;
+    // A report that broke off before its first file leaves no more than the draft of that.
+    let is_file = |entry: &std::fs::DirEntry| {
+        !entry.file_name().as_encoded_bytes().starts_with(b".report.json.")
+    };
+    let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    if entries.any(|entry| is_file(&entry)) {
         match folder.join("report.json").is_file() {
             true if overwrite => {}
             true => return refuse("has a report already; --overwrite replaces it"),

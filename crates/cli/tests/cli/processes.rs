@@ -59,6 +59,9 @@ fn a_reader_that_goes_away_changes_no_file_and_no_exit_code() {
     let trained = Trained::new();
     let (table, report) = (trained.at("t.npz"), trained.at("report"));
     let validate = ["cross-validate", text(&table), "--labels", "folders", "--cv", "3"];
+    // As a report leaves it that was killed at its first file.
+    std::fs::create_dir(&report).unwrap();
+    written(&report, ".report.json.unfinished-AbCdEf", "{");
     assert_eq!(unread(&[&validate[..], &["--report", text(&report)]].concat()), Some(0));
     assert!(report.join("report.html").is_file());
     let (one, picture) = (trained.at("audio/low/0.wav"), trained.at("p.svg"));
@@ -167,7 +170,7 @@ fn names_that_are_no_text_are_said_as_well_as_can_be() {
     assert!(std::fs::read(&whole).unwrap() == std::fs::read(name("m.npz")).unwrap());
 }
 
-/// Members that may be missing, and a ledger whose line was damaged, were not said.
+/// That members may be missing was not said.
 #[test]
 fn quiet_runs_warn() {
     let folder = tempfile::tempdir().unwrap();
@@ -214,6 +217,9 @@ fn outputs_that_cannot_be_are_refused_in_words() {
     let train = ["train", text(&table), "--labels", "folders", "-o"];
     refused(&[&train[..], &["-"]].concat(), "is not written to standard output");
     refused(&[&train[..], &["s3://bucket/m"]].concat(), "is written to a disk");
+    let validate = ["cross-validate", text(&table), "--labels", "folders", "--report"];
+    refused(&[&validate[..], &["s3://bucket/r"]].concat(), "is written to a disk");
+    refused(&["synth", "--small", "-o", "-"], "is not written to standard output");
     let long = OsString::from("n".repeat(300));
     refused(&[&train[..], &[long.to_str().unwrap()]].concat(), "too long");
     let left = names(trained.0.path());

@@ -9,6 +9,7 @@ use super::signal_chain::SignalChain;
 
 /// The span of a signal that is not cut.
 pub const WHOLE: Range<u64> = 0..u64::MAX;
+
 /// Frames of a recording that are read, and those of them that belong to the span.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Stretch {

@@ -3,7 +3,6 @@
 use corsmal_dsp::decibel::Decibel;
 use corsmal_dsp::lanes::{Row, power_to_decibel};
 use corsmal_dsp::mel::{MelParams, SparseBank, empty_filters, mel_filter};
-
 use ndarray::Array2;
 
 use super::kernel::{Finish, SpectrumKernel};

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use tempfile::TempDir;
+use corsmal_files::workplace::Workplace;
 
 use super::Existing;
 use super::error::MergeError;
@@ -43,7 +43,7 @@ pub fn merge(
         return Err(RunError::Work { path: out.into(), work: work.into() }.into());
     }
     // Removed when it is dropped.
-    let mut copies: Option<TempDir> = None;
+    let mut copies: Option<Workplace> = None;
     let mut here = Vec::with_capacity(shards.len());
     let in_stores = |error, here: &[PathBuf]| named_as_given(error, here.iter().zip(shards));
     for (index, shard) in shards.iter().enumerate() {
@@ -86,8 +86,7 @@ fn named_as_given<'a>(
     if named == message { error } else { MergeError::Copied(named) }
 }
 
-fn temporary(work: Option<&Path>) -> Result<TempDir, MergeError> {
+fn temporary(work: Option<&Path>) -> Result<Workplace, MergeError> {
     let work = work.unwrap_or(Path::new("."));
-    let made = tempfile::Builder::new().prefix(".corsmal-feat-merge-").tempdir_in(work);
-    Ok(made.map_err(RunError::Folder)?)
+    Ok(Workplace::create(work, ".corsmal-feat-merge-").map_err(RunError::Folder)?)
 }

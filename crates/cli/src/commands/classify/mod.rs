@@ -69,6 +69,7 @@ fn finish(
     let rejected = records.rejected;
     let (written, failed) = (records.written, records.failed);
     match end {
+        End::Unread if failed > 0 => return Ok(ExitCode::from(FAILED_FILES)),
         End::Unread => return Ok(ExitCode::SUCCESS),
         // A table of a part of the recordings would look like a whole one.
         End::Interrupted if written == 0 || !(is_delivered(&args.out) || args.is_stream()) => {
