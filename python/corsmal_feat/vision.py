@@ -130,6 +130,8 @@ def lode(
     """
     if variant not in ("published", "corrected"):
         raise ParameterError(f"variant must be 'published' or 'corrected', not {variant!r}")
+    if isinstance(masks, str) or isinstance(calibrations, str):
+        raise ParameterError("lode needs a list of two masks and a list of two calibrations")
     if len(masks) != 2 or len(calibrations) != 2:
         raise ParameterError(
             f"lode needs two masks and two calibrations, not {len(masks)} and {len(calibrations)}"

@@ -71,3 +71,24 @@ fn a_folder_with_other_files_is_left_alone() {
     assert!(error.contains("not synthetic"), "{error}");
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
 }
+
+/// What an earlier run had made stayed among the new recordings.
+#[test]
+fn a_folder_of_other_recordings_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let make = |size, seed| synth::generate(dir.path(), size, seed).map_err(|e| e.to_string());
+    make(Size::Small, 5).unwrap();
+    make(Size::Small, 5).unwrap();
+    for refused in [
+        make(Size::Small, 6).map(|_| ()),
+        make(Size::Reduced, 5).map(|_| ()),
+        synth::generate_with_views(dir.path(), Size::Small, 5)
+            .map(|_| ())
+            .map_err(|e| e.to_string()),
+    ] {
+        assert!(refused.unwrap_err().contains("of another size or seed"));
+    }
+    let mut all = BTreeMap::new();
+    files(dir.path(), "", &mut all);
+    assert!(all == made(2, 5));
+}

@@ -68,7 +68,8 @@ impl Pca {
     }
 
     /// Coordinates `[rows, components]` of `x [rows, columns]`; `whiten` divides each by its
-    /// standard deviation.
+    /// standard deviation, and makes those of directions without variance 0: what a recording has there is in no
+    /// proportion to anything.
     ///
     /// # Errors
     /// Another number of columns than the fit had.
@@ -79,12 +80,19 @@ impl Pca {
         }
         let mut z = (&x - &self.mean).dot(&self.components.t());
         if whiten {
-            z /= &self.explained_variance.mapv(f64::sqrt);
+            let spreads = self.explained_variance.mapv(f64::sqrt);
+            let largest = spreads.fold(0.0, |most: f64, &spread| most.max(spread));
+            let floor = largest * self.mean.len() as f64 * ROUNDING;
+            for (mut z, &spread) in z.axis_iter_mut(Axis(1)).zip(&spreads) {
+                z.mapv_inplace(|z| if spread > floor { z / spread } else { 0.0 });
+            }
         }
         Ok(z)
     }
 }
 
+/// Part of the largest spread, for each column, below which a spread may be rounding alone.
+const ROUNDING: f64 = 100.0 * f64::EPSILON;
 /// Part of the largest eigenvalue of a Gram matrix below which its eigenvectors are not resolved: rounding
 /// moves them by about the precision over this.
 const RESOLVED: f64 = 1e-8;
@@ -325,6 +333,28 @@ mod tests {
         let flat = Pca::fit(Array2::ones((3, 5)).view(), 3).unwrap();
         let eye = flat.components.dot(&flat.components.t());
         assert!((eye.diag().sum() - 3.0).abs() < 1e-12);
+    }
+
+    /// They were NaN, infinite, or as large as the inverse of rounding.
+    #[test]
+    fn directions_without_variance_whiten_to_0() {
+        let same = Pca::fit(Array2::ones((3, 5)).view(), 3).unwrap();
+        assert_eq!(same.project(sample(2, 5).view(), true).unwrap(), Array2::zeros((2, 3)));
+        // Of few rows the last direction is what centring leaves.
+        let few = Pca::fit(sample(4, 9).view(), 4).unwrap();
+        let z = few.project(sample(5, 9).view(), true).unwrap();
+        assert!(z.column(3).iter().all(|&z| z == 0.0) && z.column(2).iter().all(|&z| z != 0.0));
+        // A channel that was dead in training and lives later.
+        let mut dead = sample(40, 8);
+        dead.slice_mut(s![.., 4..]).fill(0.0);
+        let pca = Pca::fit(dead.view(), 8).unwrap();
+        let z = pca.project(sample(6, 8).view(), true).unwrap();
+        assert!(z.iter().all(|z| z.abs() < 100.0), "{z}");
+        assert!(z.slice(s![.., 4..]).iter().all(|&z| z == 0.0));
+        // As other programs write them.
+        let written =
+            Pca { explained_variance: pca.explained_variance.mapv(|v| v.max(1e-48)), ..pca };
+        assert_eq!(written.project(sample(6, 8).view(), true).unwrap(), z);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 use std::io::ErrorKind;
-use std::path::{Component, Path};
+use std::path::{Component, Path, PathBuf};
 
 use corsmal_files::draft;
 use serde::{Deserialize, Serialize};
@@ -42,12 +42,11 @@ impl Report {
     /// # Errors
     /// [`ReportError`] when something cannot be written.
     pub fn write(&self, dir: &Path, more: &[Figure]) -> Result<()> {
-        let folder = |name: &str| {
-            let path = dir.join(name);
-            std::fs::create_dir_all(&path)
-                .map_err(|source| ReportError::Folder { path: path.clone(), source })?;
-            Ok::<_, ReportError>(path)
+        let made = |path: PathBuf| match std::fs::create_dir_all(&path) {
+            Ok(()) => Ok(path),
+            Err(source) => Err(ReportError::Folder { path, source }),
         };
+        made(dir.into())?;
         let [tables, figures] = FOLDERS;
         // What another report left here would pass as part of this one.
         let page = dir.join(PAGE);
@@ -70,7 +69,7 @@ impl Report {
         let put = |path: &Path, bytes: &[u8]| draft::write(path, bytes).map_err(ReportError::Write);
         // First, so that the next report removes what this one leaves if it breaks off.
         put(&dir.join(DOCUMENT), document.as_bytes())?;
-        let places = [folder(tables)?, folder(figures)?];
+        let places = [made(dir.join(tables))?, made(dir.join(figures))?];
         let mut rows = shown.clone().flat_map(|t| &t.rows);
         let mixed = rows.any(|row| row.source != Source::Ours);
         for table in shown {

@@ -10,8 +10,20 @@ use crate::error::{CcmError, Result};
 /// The file that marks a folder as synthetic.
 pub const NOTICE: &str = "SYNTHETIC.txt";
 
-/// States that everything here is synthetic.
+/// States that everything here is synthetic. Refuses a folder of other recordings, which would stay among these.
 pub(super) fn write_notice(dir: &Path, size: Size, seed: u64, vision: bool) -> Result<()> {
+    let (path, text) = (dir.join(NOTICE), notice(size, seed, vision));
+    if std::fs::read(&path).is_ok_and(|found| found != text.as_bytes()) {
+        return Err(CcmError::Request(format!(
+            "{}: has synthetic recordings of another size or seed, or with other views, which would stay among these: \
+             remove them, or name another folder",
+            dir.display()
+        )));
+    }
+    write(&path, text.as_bytes())
+}
+
+fn notice(size: Size, seed: u64, vision: bool) -> String {
     let text = format!(
         "SYNTHETIC RECORDINGS - NOT THE CORSMAL DATA SET\n\n\
          Made by `corsmal-feat synth` (size {size:?}, seed {seed}) with simple \
@@ -31,7 +43,7 @@ pub(super) fn write_notice(dir: &Path, size: Size, seed: u64, vision: bool) -> R
     let views = "\
         calib/, rgb/, depth/           beside audio/: four views of two frames, by ray casting\n\
         detections/                    what a detector would report: boxes, labels, masks\n";
-    write(&dir.join(NOTICE), (text + if vision { views } else { "" }).as_bytes())
+    text + if vision { views } else { "" }
 }
 
 /// Writes a file and the folders above it.

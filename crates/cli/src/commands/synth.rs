@@ -20,7 +20,7 @@ use crate::failure::Failure;
                   The same seed and size give the same bytes on any number of cores."
 )]
 pub struct Args {
-    /// Folder to write to: new, empty, or from an earlier run.
+    /// Folder to write to: new, empty, or from an earlier run of the same command.
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
     /// Seed for everything random.

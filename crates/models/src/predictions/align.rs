@@ -274,7 +274,7 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
             path: self.path.clone(),
             problem,
             row: key.to_string(),
-            expected: format!("the {} lines of {}", other.rows.len(), other.path.display()),
+            expected: format!("the lines of {}", other.path.display()),
         }
     }
 }

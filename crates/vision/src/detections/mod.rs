@@ -119,12 +119,15 @@ fn detection(
     bounds: [f64; 4],
     mask: Segmentation,
 ) -> std::result::Result<Detection, String> {
-    let number = frame.parse().ok().filter(|&f| f <= MAX_FRAME);
+    // As pandas writes them: also 8.0.
+    let whole = frame.strip_suffix(".0").unwrap_or(frame);
+    let number = whole.parse().ok().filter(|&f| f <= MAX_FRAME);
     let frame = number.ok_or_else(|| format!("'{frame}' is not a frame number"))?;
     let number = view.strip_prefix('c').unwrap_or(view).parse().ok();
     let view = number
         .filter(|v| (1..=4).contains(v))
         .ok_or_else(|| format!("'{view}' is not a view (1 to 4, or c1 to c4)"))?;
+    let label = label.trim();
     // What is a number is a category's, as detectors write it: also 47.0.
     let label = match label.parse::<f64>() {
         Ok(number) => Some(number)
