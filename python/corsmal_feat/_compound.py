@@ -283,7 +283,7 @@ def pca_project(
     variance : [shape=(k,)], optional
         Variance along each component; needed with `whiten=True`.
     whiten : bool
-        Whether to divide each coordinate by its standard deviation.
+        Whether to divide each coordinate by its standard deviation; without any, it is 0.
 
     Returns
     -------

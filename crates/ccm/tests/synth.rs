@@ -79,16 +79,15 @@ fn a_folder_of_other_recordings_is_refused() {
     let make = |size, seed| synth::generate(dir.path(), size, seed).map_err(|e| e.to_string());
     make(Size::Small, 5).unwrap();
     make(Size::Small, 5).unwrap();
-    for refused in [
-        make(Size::Small, 6).map(|_| ()),
-        make(Size::Reduced, 5).map(|_| ()),
-        synth::generate_with_views(dir.path(), Size::Small, 5)
-            .map(|_| ())
-            .map_err(|e| e.to_string()),
-    ] {
-        assert!(refused.unwrap_err().contains("of another size or seed"));
+    for refused in [make(Size::Small, 6), make(Size::Reduced, 5)] {
+        assert!(refused.unwrap_err().contains("of another size, seed or version"));
     }
     let mut all = BTreeMap::new();
     files(dir.path(), "", &mut all);
     assert!(all == made(2, 5));
+    // A run with views says more, and leaves them where one without would leave them, too.
+    let notice = dir.path().join(NOTICE);
+    let views = std::fs::read_to_string(&notice).unwrap() + "calib/, rgb/, depth/";
+    std::fs::write(&notice, views).unwrap();
+    assert!(make(Size::Small, 5).unwrap_err().contains("or with views"));
 }

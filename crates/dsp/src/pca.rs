@@ -116,7 +116,13 @@ impl Eigen {
             return Err(DspError::Shape { name: "X", expected, actual: x.shape().to_vec() });
         }
         require_finite("X", x)?;
-        let mean = x.sum_axis(Axis(0)) / rows as f64;
+        let mut mean = x.sum_axis(Axis(0)) / rows as f64;
+        for (mean, column) in mean.iter_mut().zip(x.columns()) {
+            // What rounding makes of the sum of a constant would pass for variance.
+            if column.iter().all(|&value| value == column[0]) {
+                *mean = column[0];
+            }
+        }
         let centred = &x - &mean;
         let tall = rows > columns;
         let gram = if tall { gram(centred.t()) } else { gram(centred.view()) };
@@ -351,6 +357,12 @@ mod tests {
         let z = pca.project(sample(6, 8).view(), true).unwrap();
         assert!(z.iter().all(|z| z.abs() < 100.0), "{z}");
         assert!(z.slice(s![.., 4..]).iter().all(|&z| z == 0.0));
+        let mut constant = sample(10_000, 3);
+        constant.column_mut(1).fill(-100.1);
+        let known = Pca::fit(constant.view(), 3).unwrap();
+        assert_eq!(known.mean[1], -100.1);
+        let later = known.project(sample(6, 3).view(), true).unwrap();
+        assert!(later.column(2).iter().all(|&z| z == 0.0), "{later}");
         // As other programs write them.
         let written =
             Pca { explained_variance: pca.explained_variance.mapv(|v| v.max(1e-48)), ..pca };

@@ -187,8 +187,7 @@ pub fn hidden(path: &Path, suffix: &str) -> OsString {
 }
 
 /// Refuses the name of a folder, a name that the system does not allow, and a path in whose folder no file can be
-/// made. What it makes to find out is gone
-/// again.
+/// made. What it makes to find out is gone again.
 ///
 /// # Errors
 /// The path and the reason.

@@ -40,42 +40,44 @@ impl Workplace {
 pub fn remove_left(within: &Path, prefix: &str) {
     // What cannot be looked at cannot be tidied; whoever writes there will hear of it.
     for entry in std::fs::read_dir(within).into_iter().flatten().flatten() {
-        let is_ours = entry.file_name().as_encoded_bytes().starts_with(prefix.as_bytes());
+        let name = entry.file_name();
+        let random = name.as_encoded_bytes().strip_prefix(prefix.as_bytes());
+        let is_ours =
+            random.is_some_and(|r| r.len() == 6 && r.iter().all(u8::is_ascii_alphanumeric));
         if is_ours && entry.path().is_dir() && is_left(&entry.path()) {
             let _ = std::fs::remove_dir_all(entry.path());
         }
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
     use std::time::{Duration, SystemTime};
 
     use super::*;
 
     /// Makes a folder look an hour old.
-    #[cfg(unix)]
     fn age(path: &Path) -> File {
         let folder = File::open(path).unwrap();
         folder.set_modified(SystemTime::now() - Duration::from_secs(3600)).unwrap();
         folder
     }
 
-    #[cfg(unix)]
     #[test]
     fn what_killed_processes_left_is_removed_and_nothing_else() {
         let within = tempfile::tempdir().unwrap();
         let at = |name: &str| within.path().join(name);
-        for name in [".x-killed", ".x-alive", ".x-new", ".y-other"] {
+        for name in [".x-killed", ".x-living", ".x-newest", ".x-mine", ".y-others"] {
             std::fs::create_dir(at(name)).unwrap();
             std::fs::write(at(name).join("part"), b"part").unwrap();
         }
-        let alive = age(&at(".x-alive"));
-        alive.lock().unwrap();
-        [".x-killed", ".y-other"].iter().for_each(|name| drop(age(&at(name))));
+        let living = age(&at(".x-living"));
+        living.lock().unwrap();
+        [".x-killed", ".x-mine", ".y-others"].iter().for_each(|name| drop(age(&at(name))));
         let made = Workplace::create(within.path(), ".x-").unwrap();
         assert!(!at(".x-killed").exists());
-        assert!([".x-alive", ".x-new", ".y-other"].iter().all(|name| at(name).is_dir()));
+        let others = [".x-living", ".x-newest", ".x-mine", ".y-others"];
+        assert!(others.iter().all(|name| at(name).is_dir()));
         let path = made.path().to_path_buf();
         drop(age(&path));
         remove_left(within.path(), ".x-");

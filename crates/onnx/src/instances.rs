@@ -57,7 +57,9 @@ impl Instances<'_> {
         for i in 0..count {
             let (bounds, certain) = (self.boxes[i], self.scores[i]);
             if !(0.0..=1.0).contains(&certain) || !bounds.iter().all(|edge| edge.is_finite()) {
-                return Err(format!("detection {i}: score {certain}, box {bounds:?}"));
+                return Err(format!(
+                    "detection {i}: score {certain}, box {bounds:?}; expected a score from 0 to 1 and finite edges"
+                ));
             }
             let name = u8::try_from(self.labels[i]).ok().and_then(category_name);
             let Some(name) = name.filter(|_| certain >= score) else { continue };

@@ -64,6 +64,9 @@ fn connect(uri: &Uri) -> Result<Arc<dyn ObjectStore>, StoreError> {
             for (key, value) in environment("GOOGLE_")? {
                 builder = builder.with_config(key, value);
             }
+            if let Some(address) = builder.get_config_value(&GoogleConfigKey::BaseUrl) {
+                require_address("GOOGLE_BASE_URL", &address)?;
+            }
             for (key, value) in TIMES {
                 builder = builder.with_config(GoogleConfigKey::Client(key), value);
             }
@@ -123,7 +126,7 @@ fn amazon(uri: &Uri) -> Result<AmazonS3Builder, StoreError> {
     let region = builder.get_config_value(&Key::Region).unwrap_or_default();
     if !region.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)) {
         return Err(StoreError::Setup(format!(
-            "AWS_REGION, or region of the profile, must be a name such as us-east-1, not {region:?}"
+            "AWS_REGION or AWS_DEFAULT_REGION, or region of the profile, must be a name such as us-east-1, not {region:?}"
         )));
     }
     for (key, value) in TIMES {
@@ -143,8 +146,9 @@ fn environment<K: FromStr>(prefix: &str) -> Result<Vec<(K, String)>, StoreError>
         let (Some(name), Some(value)) = (name.to_str(), value.to_str()) else { continue };
         let key = name.starts_with(prefix).then(|| name.to_ascii_lowercase().parse().ok());
         let Some(key) = key.flatten().filter(|_| !value.is_empty()) else { continue };
-        // A key of Google's is a JSON text.
-        if value.contains(char::is_control) && !value.trim_start().starts_with('{') {
+        // A JSON text.
+        let is_key = name == "GOOGLE_SERVICE_ACCOUNT_KEY";
+        if value.contains(char::is_control) && !is_key {
             return Err(StoreError::Setup(format!(
                 "{name} holds a control character, such as a line feed at its end: set it without"
             )));

@@ -13,7 +13,7 @@ use crate::uri::{Scheme, Uri};
 
 /// How often a listing is asked for again, and how long after it was asked for first.
 const MORE: u32 = 2;
-const WITHIN: Duration = Duration::from_secs(10);
+const WITHIN: Duration = Duration::from_secs(60);
 
 /// All objects below a folder, at any depth, sorted by the bytes of their keys. Waiting ends when `stop`
 /// is set.

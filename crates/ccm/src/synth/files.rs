@@ -13,9 +13,13 @@ pub const NOTICE: &str = "SYNTHETIC.txt";
 /// States that everything here is synthetic. Refuses a folder of other recordings, which would stay among these.
 pub(super) fn write_notice(dir: &Path, size: Size, seed: u64, vision: bool) -> Result<()> {
     let (path, text) = (dir.join(NOTICE), notice(size, seed, vision));
-    if std::fs::read(&path).is_ok_and(|found| found != text.as_bytes()) {
+    // Views may be added to the same recordings.
+    let is_same = |found: Vec<u8>| {
+        found == text.as_bytes() || vision && found == notice(size, seed, false).as_bytes()
+    };
+    if std::fs::read(&path).is_ok_and(|found| !is_same(found)) {
         return Err(CcmError::Request(format!(
-            "{}: has synthetic recordings of another size or seed, or with other views, which would stay among these: \
+            "{}: has synthetic recordings of another size, seed or version, or with views, which would stay among these: \
              remove them, or name another folder",
             dir.display()
         )));

@@ -26,8 +26,8 @@ pub struct Summary {
 /// The same seed and size give the same bytes for any number of threads.
 ///
 /// # Errors
-/// [`CcmError`] when `dir` holds files but no [`NOTICE`] of an earlier run, and when something
-/// cannot be written.
+/// [`CcmError`] when `dir` holds files but no [`NOTICE`] of an earlier run, or one of other recordings, and when
+/// something cannot be written.
 pub fn generate(dir: &Path, size: Size, seed: u64) -> Result<Summary> {
     make(dir, size, seed, false)
 }

@@ -73,6 +73,10 @@ fn a_reader_that_goes_away_changes_no_file_and_no_exit_code() {
     let extract = ["extract", text(&audio), "-o", text(&out), "--preset", "esc26", "--json"];
     assert_eq!(unread(&extract), Some(1));
     assert_eq!(unread(&["inspect", text(&audio)]), Some(1));
+    // It ends at the line that nobody reads, the first of which is of the broken file.
+    let (model, broken) = (trained.at("m"), written(&audio, "a.wav", "RIFF"));
+    assert_eq!(unread(&["classify", "-m", text(&model), text(&broken), text(&one)]), Some(1));
+    assert_eq!(unread(&["classify", "-m", text(&model), text(&one)]), Some(0));
 }
 
 /// The partial table of a list took the place of a whole one.
