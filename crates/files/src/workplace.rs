@@ -50,7 +50,8 @@ pub fn remove_left(within: &Path, prefix: &str) {
     }
 }
 
-#[cfg(all(test, unix))]
+#[cfg(unix)]
+#[cfg(test)]
 mod tests {
     use std::time::{Duration, SystemTime};
 
