@@ -18,7 +18,7 @@ pub fn require_disk(path: &Path) -> Result<(), Failure> {
     let scheme = path.to_str().and_then(|name| name.split_once("://"));
     if scheme.is_some_and(|(scheme, _)| is_scheme(scheme)) && !path.exists() {
         return Err(Failure::new(format!(
-            "{}: this output is written to a disk: give a name there, and copy it when it is whole",
+            "{}: this output is written to a disk: name a place there, and copy it when it is complete",
             path.display()
         )));
     }

@@ -84,7 +84,7 @@ impl From<object_store::Error> for StoreError {
             _ if is_of_credentials(&error.to_string()) => Self::Setup(NO_CREDENTIALS.into()),
             // Names that are given are looked at before: this one is of a listing.
             E::InvalidPath { source } => Self::Unsupported(format!(
-                "the listing has a key that is not read ({source}): list a folder without it, or name the objects in a \
+                "the listing has a key that cannot be read ({source}): list a folder without it, or name the objects in a \
                  manifest"
             )),
             _ => match words(&error) {

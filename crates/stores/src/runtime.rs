@@ -120,7 +120,7 @@ pub(crate) fn wait<T>(coming: &Coming<T>, stop: &AtomicBool) -> Result<T, StoreE
             }
             Err(RecvTimeoutError::Disconnected) => {
                 return Err(StoreError::Setup(
-                    "the client of the store failed: is a setting (AWS_*, AZURE_*, GOOGLE_*) one that no request can carry?"
+                    "the store's client failed: check AWS_*, AZURE_* and GOOGLE_* for characters that a request cannot carry"
                         .into(),
                 ));
             }

@@ -87,7 +87,9 @@ impl Uri {
         let marks = if is_account { "._-@$" } else { "._-" };
         let allowed = |c: char| c.is_ascii_alphanumeric() || marks.contains(c);
         if let Some(other) = bucket.chars().find(|c| scheme != Scheme::Web && !allowed(*c)) {
-            return Err(wrong(format!("has {other:?} in its bucket, which no store allows")));
+            return Err(wrong(format!(
+                "has {other:?} in the name of its bucket, which no store allows"
+            )));
         }
         let (key, query) = match scheme {
             Scheme::Web => {

@@ -57,8 +57,8 @@ fn cropped(signal: &SignalConfig, window: f64) -> Option<String> {
     let keys: Vec<String> = start.into_iter().chain(end).collect();
     (!keys.is_empty()).then(|| {
         format!(
-            "{}: the model's features leave out a part of each window, as they do of each recording: for features of \
-             whole windows, train without",
+            "{}: the model's features leave out a part of each window, as they did of each training recording; to use \
+             whole windows, train without these settings",
             keys.join(", ")
         )
     })
