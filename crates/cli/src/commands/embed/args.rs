@@ -1,8 +1,15 @@
 //! Arguments of `embed`.
 
 use std::path::PathBuf;
+#[cfg(feature = "nets")]
+use std::process::ExitCode;
+
+#[cfg(feature = "nets")]
+use serde_json::json;
 
 use crate::args::{Jobs, Told};
+#[cfg(feature = "nets")]
+use crate::failure::{FAILED_FILES, Failure};
 
 /// Arguments of `embed`.
 #[derive(clap::Args)]
@@ -53,4 +60,22 @@ pub struct Args {
     pub(super) jobs: Jobs,
     #[command(flatten)]
     pub(super) told: Told,
+}
+
+#[cfg(feature = "nets")]
+impl Args {
+    /// Says what was written, `[rows, width]` of so many recordings, and gives the exit code.
+    pub(super) fn tell(
+        &self,
+        recordings: usize,
+        [rows, width]: [usize; 2],
+        failed: usize,
+    ) -> Result<ExitCode, Failure> {
+        let out = self.out.display().to_string();
+        self.told.tell(
+            || json!({ "out": out, "recordings": recordings, "rows": rows, "width": width, "failed": failed }),
+            || format!("{out}: {recordings} recordings, {rows} x {width}"),
+        )?;
+        Ok(if failed > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
+    }
 }

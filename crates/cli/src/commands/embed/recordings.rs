@@ -6,10 +6,9 @@ use std::process::ExitCode;
 use corsmal_files::format::require_npz;
 use corsmal_systems::SystemError;
 use corsmal_systems::embedding::Embedder;
-use serde_json::json;
 
 use super::args::Args;
-use crate::failure::{FAILED_FILES, Failure, INTERRUPTED};
+use crate::failure::{Failure, INTERRUPTED};
 use crate::recordings;
 
 /// Embeds recordings and writes.
@@ -39,10 +38,5 @@ pub fn run(args: &Args, weights: &Path) -> Result<ExitCode, Failure> {
     let (recordings, width) = (dataset.ids.len(), embedder.width());
     let rows = dataset.items.columns[0].values.len() / width;
     dataset.write_sequences(&args.out, width, &embedder.provenance(&found).to_string())?;
-    let out = &args.out;
-    args.told.tell(
-        || json!({ "out": out.display().to_string(), "recordings": recordings, "rows": rows, "width": width, "failed": failed }),
-        || format!("{}: {recordings} recordings, {rows} x {width}", out.display()),
-    )?;
-    Ok(if failed > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
+    args.tell(recordings, [rows, width], failed)
 }

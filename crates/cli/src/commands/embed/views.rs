@@ -15,7 +15,7 @@ use corsmal_onnx::runtime::{ClipEmbedder, Runtime};
 use serde_json::json;
 
 use super::args::Args;
-use crate::failure::{FAILED_FILES, Failure, INTERRUPTED};
+use crate::failure::{Failure, INTERRUPTED};
 
 /// Views, each of which has a sequence.
 const VIEWS: u8 = 4;
@@ -84,12 +84,7 @@ pub fn run(args: &Args, data: &Path, model: &Path, library: &Path) -> Result<Exi
         "tool_version": env!("CARGO_PKG_VERSION"), "network": "r21d", "weights": identity,
     });
     dataset.write_sequences(&args.out, FEATURES, &about.to_string())?;
-    let out = &args.out;
-    args.told.tell(
-        || json!({ "out": out.display().to_string(), "recordings": recordings, "rows": rows, "width": FEATURES, "failed": failed }),
-        || format!("{}: {recordings} recordings, {rows} x {FEATURES}", out.display()),
-    )?;
-    Ok(if failed > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
+    args.tell(recordings, [rows, FEATURES], failed)
 }
 
 /// What ends the work on a recording, or on all.
