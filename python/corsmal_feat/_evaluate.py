@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from . import _core
 from ._arrays import size
 from ._by_name import ByName
-from ._refusals import refuses, seed_of
+from ._refusals import existing, refuses, seed_of
 from .errors import ParameterError
 
 __all__ = ["Scores", "evaluate"]
@@ -78,6 +78,8 @@ def evaluate(
     ------
     ParameterError
         A file cannot be read, its rows do not fit the annotations, or a number is out of range.
+    MissingFileError
+        A file does not exist.
 
     Examples
     --------
@@ -93,8 +95,8 @@ def evaluate(
     for container in chosen or ():
         if not 0 <= container <= 255:
             raise ParameterError(f"containers must be numbers from 0 to 255, not {container}")
-    reference = None if baseline is None else os.fspath(baseline)
+    reference = None if baseline is None else existing(baseline)
     values, recordings, notes = _core.evaluate(
-        os.fspath(submission), os.fspath(annotations), rules, reference, seed, chosen
+        existing(submission), existing(annotations), rules, reference, seed, chosen
     )
     return Scores(dict(values), rules, recordings, notes)

@@ -308,7 +308,7 @@ def _labels(labels: StrPath | None, id_column: str | None, target: str) -> dict[
     if id_column is not None and (labels is None or folders):
         raise ParameterError("id_column needs a label file")
     return {
-        "file": None if labels is None or folders else os.fspath(labels),
+        "file": None if labels is None or folders else existing(labels),
         "folders": target if folders else None,
         "id_column": id_column,
     }

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import as_array
-from ._refusals import refuses
+from ._refusals import existing, refuses
 from .errors import ParameterError
 
 StrPath = str | os.PathLike[str]
@@ -87,13 +87,15 @@ def load_calibration(path: StrPath) -> Calibration:
     ------
     ParameterError
         The file cannot be read, holds anything else, or has no colour camera.
+    MissingFileError
+        There is no such file.
 
     Examples
     --------
     >>> corsmal_feat.vision.load_calibration("c1.json").rgb.translation.tolist()
     [0.0, 0.05, 1.0]
     """
-    return Calibration(**{name: _camera(n) for name, n in _core.load_calibration(os.fspath(path))})
+    return Calibration(**{name: _camera(n) for name, n in _core.load_calibration(existing(path))})
 
 
 @refuses
@@ -115,6 +117,8 @@ def load_mask(path: StrPath) -> npt.NDArray[np.bool_]:
     ParameterError
         The file cannot be read, has several values beside black, or has the mask in its
         transparency.
+    MissingFileError
+        There is no such file.
 
     Examples
     --------
@@ -122,7 +126,7 @@ def load_mask(path: StrPath) -> npt.NDArray[np.bool_]:
     >>> mask.shape, int(mask.sum())
     ((700, 640), 5005)
     """
-    return _core.load_mask(os.fspath(path))
+    return _core.load_mask(existing(path))
 
 
 @refuses
@@ -144,7 +148,7 @@ def load_depth(path: StrPath) -> npt.NDArray[np.uint16]:
     >>> corsmal_feat.vision.load_depth("c1_depth.png").max()
     np.uint16(997)
     """
-    return _core.load_depth(os.fspath(path))
+    return _core.load_depth(existing(path))
 
 
 def _camera(numbers: Sequence[float]) -> Camera:

@@ -22,7 +22,7 @@ from ._arrays import Singles, as_array
 from ._class_labels import check_named, label_kind
 from ._features import StrPath
 from ._network import Network, TrainingSteps, settings, single
-from ._refusals import refuses, seed_of
+from ._refusals import existing, refuses, seed_of
 from ._scoring import CrossValidation, validated
 from ._trained_network import TrainedNetwork, jobs_of, paths_of
 from ._warnings import warn
@@ -225,7 +225,7 @@ def load(path: StrPath) -> TrainedNetwork:
     >>> corsmal_feat.nets.load("pouring.safetensors").predict(["rice.wav", "water.wav"]).tolist()
     ['rice', 'water']
     """
-    return TrainedNetwork(_core.TrainedNetwork.load(os.fspath(path)))
+    return TrainedNetwork(_core.TrainedNetwork.load(existing(path)))
 
 
 @refuses
@@ -265,7 +265,7 @@ def embed(
     corsmal_feat.errors.ParameterError: m2_type gives classes, not embeddings; vggish gives embeddings
     """  # noqa: E501
     rows, failed = _core.embed_recordings(
-        name, paths_of(recordings), os.fspath(weights), jobs_of(jobs)
+        name, paths_of(recordings), existing(weights), jobs_of(jobs)
     )
     if failed:
         more = f" (and {len(failed) - 1} more)" if len(failed) > 1 else ""
@@ -293,7 +293,7 @@ def read_weights(path: StrPath) -> dict[str, Singles]:
     >>> corsmal_feat.nets.read_weights("one.safetensors")["bias"].tolist()
     [1.0, 1.0, 1.0]
     """
-    return _core.read_weights(os.fspath(path))
+    return _core.read_weights(existing(path))
 
 
 @refuses

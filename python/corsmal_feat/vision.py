@@ -6,7 +6,6 @@ published, what is corrected, and what is our interpretation.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from typing import Literal, TypedDict
 
@@ -15,7 +14,7 @@ import numpy.typing as npt
 
 from . import _core
 from ._arrays import as_array
-from ._refusals import refuses, seed_of
+from ._refusals import existing, refuses, seed_of
 from ._views import (
     Calibration,
     Camera,
@@ -323,4 +322,4 @@ def m2_capacity(depth: Depth | Region, weights: StrPath) -> float | None:
     if image.ndim != 2:
         raise ParameterError(f"the image of a region has shape {image.shape}, expected (112, 112)")
     height, width = found["size"]
-    return _core.m2_capacity(image, (float(height), float(width)), os.fspath(weights))
+    return _core.m2_capacity(image, (float(height), float(width)), existing(weights))

@@ -43,7 +43,7 @@ def test_scores_by_name() -> None:
 def test_what_cannot_be_scored_is_refused(tmp_path: Path) -> None:
     with pytest.raises(corsmal_feat.ParameterError, match=r"rules must be .*, not best"):
         corsmal_feat.evaluate(SUBMISSION, ANNOTATIONS, rules="best")
-    with pytest.raises(corsmal_feat.ParameterError, match=r"none\.csv"):
+    with pytest.raises(corsmal_feat.MissingFileError, match=r"none\.csv"):
         corsmal_feat.evaluate(tmp_path / "none.csv", ANNOTATIONS)
     with pytest.raises(corsmal_feat.ParameterError, match="0 to 255, not 300"):
         corsmal_feat.evaluate(SUBMISSION, ANNOTATIONS, containers=[300])

@@ -193,6 +193,29 @@ def test_errors_name_the_file_wherever_they_come(
         cf.load("s3://bucket/x.wav")
 
 
+def test_every_reader_names_a_missing_file(tmp_path: Path) -> None:
+    """Those of networks and pictures spoke of parameters and models."""
+    nothing, there = str(tmp_path / "nothing"), tmp_path / "there.csv"
+    there.write_text("id,true,predicted\na,x,x\n")
+    readers: list[Callable[[], object]] = [
+        lambda: cf.vision.load_calibration(nothing),
+        lambda: cf.vision.load_mask(nothing),
+        lambda: cf.vision.load_depth(nothing),
+        lambda: cf.nets.load(nothing),
+        lambda: cf.nets.read_weights(nothing),
+        lambda: cf.nets.embed("vggish", [there], nothing),
+        lambda: cf.evaluate(nothing, there),
+        lambda: cf.evaluate(there, nothing),
+        lambda: cf.score(there, labels=nothing),
+        lambda: cf.load_model(nothing),
+        lambda: cf.compare_predictions(there, nothing),
+    ]
+    for read in readers:
+        with pytest.raises(cf.MissingFileError) as caught:
+            read()
+        assert caught.value.filename == nothing and str(caught.value).startswith(nothing)
+
+
 def test_file_errors_keep_what_the_system_said(tmp_path: Path) -> None:
     """Process pools pickle them, and their numbers were lost."""
     errors = []

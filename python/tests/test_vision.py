@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from corsmal_feat import vision
-from corsmal_feat.errors import ParameterError
+from corsmal_feat.errors import MissingFileError, ParameterError
 
 SHARED = Path(os.environ.get("CORSMAL_SHARED", Path(__file__).parents[3] / "shared"))
 
@@ -95,7 +95,7 @@ def test_refusals_say_what_is_possible(tmp_path: Path) -> None:
     evil.write_bytes(b"cos\nsystem\n(S'true'\ntR.")
     with pytest.raises(ParameterError, match=r"os\.system"):
         vision.load_calibration(evil)
-    with pytest.raises(ParameterError, match=r"none\.png"):
+    with pytest.raises(MissingFileError, match=r"none\.png"):
         vision.load_mask(tmp_path / "none.png")
 
 

@@ -324,3 +324,15 @@ fn ids_are_no_classes() {
     let numbers = done(&["score", text(&file), "--numeric", "--json"]);
     assert!(numbers.contains("\"numbers\""), "{numbers:.200}");
 }
+
+/// The message named the predictions alone, which were right.
+#[test]
+fn a_bad_number_is_said_to_be_true_or_an_estimate() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("p.csv");
+    for (row, words) in [("a,1e,2", "a: the true value"), ("a,2,1e", "a: the estimate")] {
+        std::fs::write(&file, format!("id,true,predicted\n{row}\nb,3,3\n")).unwrap();
+        let message = refused(&["score", text(&file), "--numeric"]);
+        assert!(message.contains(&format!("{words} \"1e\" is not a number")), "{message}");
+    }
+}

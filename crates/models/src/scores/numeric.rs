@@ -21,7 +21,7 @@ pub struct NumericScores {
     /// coefficient of determination (scikit-learn's `r2_score`)
     pub r2: f64,
     /// the paper's score: mean of exp(−|estimate − truth| / truth), the error being the estimate
-    /// itself where the true value is 0
+    /// itself where the true value is 0; below -1 an estimate counts 0 unless a true number is negative
     pub score: f64,
     /// 95 % bootstrap interval of the paper's score
     pub score_interval: Interval,
@@ -70,8 +70,12 @@ impl NumericScores {
         let spread = mean(&|(t, _)| (t - centre).powi(2));
         let relative: Vec<f64> =
             pairs.iter().filter(|(t, _)| *t != 0.0).map(|(t, e)| ((e - t) / t).abs()).collect();
+        let none = no_estimate(truth);
         let of_row = |row: usize| {
             let (t, Some(e)) = (truth[row], estimates[row]) else { return 0.0 };
+            if none.is_some_and(|none| e <= none) {
+                return 0.0;
+            }
             let error = if t == 0.0 { e.abs() } else { ((e - t) / t).abs() };
             (-error).exp()
         };
@@ -109,6 +113,20 @@ mod tests {
     fn minus_one_is_no_estimate_only_among_numbers_that_are_not_negative() {
         assert_eq!(no_estimate(&[0.0, 3.0]), Some(-1.0));
         assert_eq!(no_estimate(&[-20.5, 3.0]), None);
+    }
+
+    /// They earned exp(-|estimate - truth| / truth), of which the benchmark knows nothing.
+    #[test]
+    fn estimates_below_minus_one_earn_nothing_in_the_score_of_the_paper() {
+        let score = |truth: [f64; 2]| {
+            let estimates = [Some(100.0), Some(-5.0)];
+            let scores = NumericScores::new::<&str>(&truth, &estimates, ("rows", None), (0, 0));
+            let scores = scores.unwrap();
+            assert_eq!((scores.rows, scores.unknown), (2, 0));
+            scores.score
+        };
+        assert_eq!(score([100.0, 50.0]), 0.5);
+        assert_eq!(score([100.0, -5.0]), 1.0);
     }
 
     /// As scikit-learn's `r2_score`, but for rounding.

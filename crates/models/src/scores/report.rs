@@ -184,22 +184,22 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         drawn: (&str, Option<&[&str]>),
         how: &Scoring,
     ) -> Result<NumericScores, PredictionError> {
-        let number = |text: &str, row: usize| match text.parse::<f64>() {
+        let number = |what: &str, text: &str, row: usize| match text.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
             _ => {
                 let id = &self.rows[row].cells[0];
-                Err(self.content(format!("{id}: {text:?} is not a number")))
+                Err(self.content(format!("{id}: the {what} {text:?} is not a number")))
             }
         };
         let truths: Vec<f64> = truth
             .iter()
             .enumerate()
-            .map(|(row, text)| number(text, row))
+            .map(|(row, text)| number("true value", text, row))
             .collect::<Result<_, _>>()?;
         let none = no_estimate(&truths);
         let estimate = |(at, row): (usize, &crate::predictions::PredictionRow<K>)| {
             let text = row.class.map(|class| self.labels[class].as_str());
-            let value = text.map(|text| number(text, at)).transpose()?;
+            let value = text.map(|text| number("estimate", text, at)).transpose()?;
             Ok(value.filter(|value| Some(*value) != none))
         };
         let estimates: Vec<Option<f64>> =

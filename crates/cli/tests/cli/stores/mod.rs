@@ -1,6 +1,7 @@
 //! Recordings in stores: the same numbers as from a folder, whatever the network does.
 
 mod interrupts;
+mod listing;
 mod loopback;
 mod outputs;
 

@@ -6,6 +6,7 @@
 
 mod kernel;
 mod linfa;
+mod pair;
 mod probability;
 mod smo;
 mod two_class;
@@ -18,6 +19,7 @@ use serde::{Deserialize, Serialize};
 
 use self::kernel::{Centred, Function, Gram};
 use self::linfa::Solved;
+use self::pair::{Pair, compact};
 use self::probability::Sigmoid;
 use self::two_class::TwoClass;
 use super::{Classify, Train};
@@ -117,26 +119,6 @@ impl SvmParams {
                 Function::Rbf { gamma }
             }
         }
-    }
-}
-
-/// One two-class machine: class `first` is on the positive side.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-struct Pair {
-    first: usize,
-    second: usize,
-    /// rows of the support table
-    rows: Vec<u32>,
-    /// α·y of each
-    coefficients: Vec<f64>,
-    rho: f64,
-    sigmoid: Option<Sigmoid>,
-}
-
-impl Pair {
-    /// Rows and α·y of each.
-    fn terms(&self) -> impl Iterator<Item = (usize, &f64)> {
-        self.rows.iter().map(|&row| row as usize).zip(&self.coefficients)
     }
 }
 
@@ -252,18 +234,6 @@ impl SvmParams {
             .collect::<Result<_>>()?;
         Ok(Svm::new(n_classes, function, pairs, x, &centred))
     }
-}
-
-/// Keeps each training row that any pair needs once, and renumbers the pairs' rows.
-fn compact(pairs: &mut [Pair], x: ArrayView2<'_, f64>) -> Array2<f64> {
-    let mut used: Vec<u32> = pairs.iter().flat_map(|p| p.rows.iter().copied()).collect();
-    used.sort_unstable();
-    used.dedup();
-    let mut number = vec![0; x.nrows()];
-    used.iter().enumerate().for_each(|(i, &row)| number[row as usize] = i as u32);
-    pairs.iter_mut().for_each(|p| p.rows.iter_mut().for_each(|r| *r = number[*r as usize]));
-    let rows: Vec<usize> = used.iter().map(|&r| r as usize).collect();
-    x.select(Axis(0), &rows)
 }
 
 impl Svm {
