@@ -8,7 +8,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,7 @@ from ._arrays import audio, size
 from ._features import Features, load_features
 from ._refusals import refuses
 from ._warnings import warn
-from .errors import ParameterError
+from .errors import DataTypeError, ParameterError
 
 StrPath = str | os.PathLike[str]
 Config = StrPath | Mapping[str, Any]
@@ -249,6 +249,9 @@ class SignalExtractor:
             )
         self._signal.push(samples)
 
+    def __reduce__(self) -> NoReturn:
+        raise DataTypeError("a SignalExtractor cannot be copied or pickled: make another one")
+
     def finish(self) -> npt.NDArray[np.float32] | dict[str, npt.NDArray[Any]]:
         """The summary [shape=(len(names),)], or a dict of the frames of each feature
         [shape=(channels, coefficients, frames)]."""
@@ -273,4 +276,10 @@ def interleaved(y: Any) -> npt.NDArray[np.float32]:
     samples = np.atleast_2d(audio(y))
     if samples.ndim > 2:
         raise ParameterError(f"y has {samples.ndim} dimensions, expected (n,) or (channels, n)")
-    return np.ascontiguousarray(samples.T, dtype=np.float32)
+    with np.errstate(over="ignore"):
+        narrow = np.ascontiguousarray(samples.T, dtype=np.float32)
+    if samples.dtype == np.float64:
+        # What overflows is finite, and too loud.
+        beyond = np.isinf(narrow) & np.isfinite(samples.T)
+        narrow[beyond] = np.copysign(np.finfo(np.float32).max, narrow[beyond])
+    return narrow

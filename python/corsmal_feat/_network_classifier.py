@@ -17,6 +17,7 @@ from ._network import settings
 from ._refusals import destination, existing, seed_of
 from ._sklearn import BaseEstimator, ClassifierMixin, not_fitted
 from ._validation import labels_of
+from ._warnings import warn
 from .errors import DataTypeError, ParameterError
 
 #: values of one input of all items, and where each item begins
@@ -81,6 +82,9 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         count = len(columns[0][1]) - 1
         classes, positions = labels_of(y, count, type(self).__name__)
         held = _watched(watched, count)
+        learned = set(positions[[i for i in range(count) if i not in held]].tolist())
+        if unlearned := [str(c) for i, c in enumerate(classes.tolist()) if i not in learned]:
+            warn(f"all items of {', '.join(unlearned)} are watched: nothing is learned of them")
         changes = settings(self.recipe)
         if self.random_state is not None:
             changes["seed"] = seed_of(self.random_state)
@@ -178,10 +182,11 @@ def _watched(watched: Iterable[int] | npt.NDArray[Any] | None, count: int) -> se
     given = watched.tolist() if isinstance(watched, np.ndarray) else watched
     if not isinstance(given, Iterable) or isinstance(given, str):
         raise ParameterError(f"watched must hold indices of items, not {watched!r}")
-    held = {size("watched", i, 0) for i in given}
-    if held and max(held) >= count:
-        raise ParameterError(f"watched must hold indices of {count} items, not {max(held)}")
-    return held
+    given = list(given)
+    for index in given:
+        if isinstance(index, int | np.integer) and not 0 <= index < count:
+            raise ParameterError(f"watched must hold indices of {count} items, not {index}")
+    return {size("watched", i, 0) for i in given}
 
 
 def _column(items: list[Any], place: str, shape: str) -> _Column:

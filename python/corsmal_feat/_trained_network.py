@@ -56,7 +56,7 @@ class TrainedNetwork:
         Parameters
         ----------
         recordings : paths
-            One path per recording.
+            One path per recording; one may be named several times.
         any_rate : bool
             Whether to accept recordings with a sample rate or a number of channels that the network
             was not trained on.
@@ -72,14 +72,16 @@ class TrainedNetwork:
         DecodeError : the network cannot classify a recording
         """
         paths = paths_of(recordings)
-        proba, failed, strange = _core.hear_recordings(
-            self._network, paths, any_rate, jobs_of(jobs)
-        )
+        once = list(dict.fromkeys(paths))
+        proba, failed, strange = _core.hear_recordings(self._network, once, any_rate, jobs_of(jobs))
         if failed:
             raise DecodeError(f"{failed[0][0]}: {failed[0][1]}")
         if strange is not None:
             warn(strange)
-        return proba
+        if len(once) == len(paths):
+            return proba
+        row_of = {path: row for row, path in enumerate(once)}
+        return proba[[row_of[path] for path in paths]]
 
     @refuses
     def predict(

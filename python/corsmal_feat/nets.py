@@ -141,9 +141,11 @@ def train(
     ['rice', 'water']
     """
     rows, kind = _rows(recordings, y, groups)
-    network, left_out = _core.train_network(
+    network, doubt, left_out = _core.train_network(
         name, rows, kind, _recipe(name, recipe), _folder(checkpoints), progress, jobs_of(jobs)
     )
+    if doubt is not None:
+        warn(doubt)
     _tell_left_out(left_out, len(rows))
     return TrainedNetwork(network)
 

@@ -237,36 +237,6 @@ def test_infinity_is_a_value_of_a_configuration(folder: Path):
     assert hard.config_hash == word.config_hash == key.config_hash
 
 
-def test_signals_that_have_no_features():
-    with pytest.raises(cf.ParameterError, match="no samples"):
-        cf.SignalExtractor(RATE).finish()
-    with pytest.raises(cf.ParameterError, match="NaN"):
-        cf.SignalExtractor(RATE).push(np.full(10, np.nan, np.float32))
-    with pytest.raises(cf.ParameterError, match="expected 2"):
-        cf.SignalExtractor(RATE, 2).push(np.zeros(10, np.float32))
-    with pytest.raises(cf.ParameterError, match=r"2\*\*15"):
-        cf.SignalExtractor(RATE).push(pour(0)[0])
-    for sr in (0, 22050.5, None):
-        with pytest.raises(cf.ParameterError, match="sr"):
-            cf.SignalExtractor(sr)
-
-
-@pytest.mark.parametrize("crop", [{}, {"signal": {"start": 0.5, "end": 2.5}}], ids=str)
-def test_a_refused_block_leaves_the_signal_as_it_was(crop: dict):
-    """The samples before the bad one were kept, or the block used up the crop."""
-    config = {"features": {"rms": {"hop_length": 1000}}, **crop}
-    good = np.sin(np.arange(45000, dtype=np.float32))
-    bad = good.copy()
-    bad[39000] = 1e13
-    refused = cf.SignalExtractor(16000, config=config)
-    with pytest.raises(cf.ParameterError, match="frame 39000"):
-        refused.push(bad)
-    refused.push(good)
-    alone = cf.SignalExtractor(16000, config=config)
-    alone.push(good)
-    np.testing.assert_array_equal(refused.finish()["rms"], alone.finish()["rms"])
-
-
 def test_transformer_over_paths_and_arrays(folder: Path):
     paths = [folder / f"r{i}.wav" for i in (2, 0, 2, 1)]
     of_paths = cf.FeatureExtractor("esc26").fit_transform(paths)

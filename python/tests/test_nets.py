@@ -52,9 +52,13 @@ def test_watched_items_may_be_an_array() -> None:
         assert history(np.array(watched)) == expected
         assert expected["epochs"][0]["score"] is not None  # type: ignore[index]
     assert history(np.array([], dtype=int)) == history(None)
-    for wrong, message in (([12], "indices of 12 items, not 12"), ([-1], "watched must be 0 to")):
-        with pytest.raises(ParameterError, match=message):
-            history(wrong)
+    for wrong in (12, -1):
+        with pytest.raises(ParameterError, match=f"indices of 12 items, not {wrong}"):
+            history([wrong])
+    with pytest.warns(UserWarning, match="all items of b are watched: nothing is learned of them"):
+        nets.NetworkClassifier("attention_gru", recipe={"epochs": 1}).fit(
+            x, [*"aaaaaacccccb"], watched=[11]
+        )
     net = nets.NetworkClassifier("attention_gru", recipe={"lr": float("nan")})
     with pytest.raises(ParameterError, match="recipe: lr must be a finite number, not nan"):
         net.fit(x, y)
@@ -219,6 +223,12 @@ def test_a_network_learns_from_recordings_and_hears_them(tmp_path: Path) -> None
     assert network.predict(paths).tolist() == y
     proba = network.predict_proba(paths, jobs=2)
     assert np.allclose(proba.sum(axis=1), 1)
+    # Estimators take a path twice, and the advice here led nowhere.
+    twice = [4, 0, 0, 4]
+    assert np.array_equal(network.predict_proba([paths[i] for i in twice]), proba[twice])
+    slow = recording(tmp_path / "slow.wav", 300, 22_050)
+    with pytest.warns(UserWarning, match="have sample rates of 22050, 44100 Hz, so their"):
+        nets.train("m1", [*paths, slow], [*y, 1], recipe={"epochs": 1})
 
     network.save(tmp_path / "tone.safetensors")
     back = nets.load(tmp_path / "tone.safetensors")

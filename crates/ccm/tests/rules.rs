@@ -59,6 +59,14 @@ fn close(scores: &Scores, name: &str, expected: f64) {
     assert!((value - expected).abs() < 1e-9, "{name}: {value}, expected {expected}");
 }
 
+/// In an empty container it earned exp(-mass), which is more than 1.
+#[test]
+fn a_mass_below_zero_earns_nothing_in_the_paper() {
+    let mut rows = RIGHT;
+    rows[0] = ["-2.4", "1", "2"];
+    close(&score_rows(rows, RuleSet::Paper), "mass", 75.0);
+}
+
 #[test]
 fn everything_right() {
     let paper = score_rows(RIGHT, RuleSet::Paper);

@@ -140,6 +140,9 @@ impl Request<'_> {
             let items = plural(unlabelled, "item");
             eprintln!("warning: {}: {items} without {target}: left out", path.display());
         }
+        if let Some(doubt) = examples.doubt() {
+            eprintln!("warning: {}: {doubt}", path.display());
+        }
         Ok(Loaded { examples, recipe, target })
     }
 

@@ -7,6 +7,7 @@ use std::str::FromStr;
 use crate::copies;
 use crate::dataset::{LabelledTable, Result};
 use crate::error::ModelError;
+use crate::groups;
 use crate::labels::{Labels, alike, is_missing, measured, missing};
 use crate::splits::{self, Fold};
 use crate::targets::Classes;
@@ -15,8 +16,6 @@ use crate::words::count;
 /// Inner folds of a choice, and folds without groups, unless there are fewer groups.
 const FOLDS: usize = 5;
 
-/// Columns that are groups unless the user says otherwise.
-const GROUPS: [&str; 2] = ["container", "group"];
 /// The recordings of windows, which no folds split unless the user names other groups.
 const RECORDING: &str = "recording";
 
@@ -110,22 +109,15 @@ impl Folds {
         seed: u32,
     ) -> Result<Self> {
         let y = &classes.indices().to_vec();
-        let is_target = |column: &str| {
-            let of_row = |row: usize| &labels.names()[y[row]];
-            table
-                .column(column)
-                .is_ok_and(|v| v.iter().enumerate().all(|(row, v)| v == of_row(row)))
-        };
-        let known =
-            || GROUPS.into_iter().find(|column| has_groups(table, column) && !is_target(column));
-        let default = match groups.or_else(known) {
+        let target = (labels, classes);
+        let default = match groups.or_else(|| groups::usual(table, target)) {
             Some(column) => CvPlan::Group(column.into()),
             None => CvPlan::K(FOLDS),
         };
         let plan = plan.unwrap_or(&default);
         let of_windows = !matches!(plan, CvPlan::Lists(_))
-            && has_groups(table, RECORDING)
-            && !is_target(RECORDING);
+            && groups::are_several(table, RECORDING)
+            && !groups::is_target(table, RECORDING, target);
         let groups = groups.or(of_windows.then_some(RECORDING));
         let column = match plan {
             CvPlan::Group(column) | CvPlan::Fold(column) => Some(column.as_str()),
@@ -168,9 +160,10 @@ impl Folds {
         if let (CvPlan::K(_), None) = (plan, column) {
             let is_split = |column: &&str| {
                 let values = table.column(column);
-                !is_target(column) && values.is_ok_and(|values| splits_any(&outer, &values))
+                !groups::is_target(table, column, target)
+                    && values.is_ok_and(|values| splits_any(&outer, &values))
             };
-            odd.extend(GROUPS.into_iter().filter(is_split).map(|groups| {
+            odd.extend(groups::USUAL.into_iter().filter(is_split).map(|groups| {
                 format!(
                     "rows of one {groups} are in both training and test: --groups {groups} keeps them together"
                 )
@@ -289,10 +282,6 @@ fn refuse_split(folds: &[Fold], groups: &[String], (plan, column): (&CvPlan, &st
         }
     }
     Ok(())
-}
-
-fn has_groups(table: &LabelledTable, column: &str) -> bool {
-    table.column(column).is_ok_and(|values| Labels::of(&values).0.len() > 1)
 }
 
 /// Whether some fold tests a value that it also trains on.

@@ -44,6 +44,16 @@ impl TrainedOn {
         Some(Self { seconds: Lengths::of(good().filter_map(Outcome::seconds)), ..formats })
     }
 
+    /// Says that the recordings have several sample rates and, by their configuration, keep them.
+    pub fn mixed_rates(&self, config: &Value) -> Option<String> {
+        let own_rate = config["signal"]["sample_rate"].as_f64() == Some(0.0);
+        (own_rate && self.sample_rates.len() > 1).then(|| {
+            let rates: Vec<String> = self.sample_rates.iter().map(u32::to_string).collect();
+            let rates = rates.join(", ");
+            format!("the recordings have sample rates of {rates} Hz, so their features differ")
+        })
+    }
+
     /// Which recordings may have features by the configuration `used`, where those trained on were
     /// made by `own`.
     ///

@@ -52,6 +52,7 @@ pub mod folds;
 mod formats;
 pub mod fusion;
 pub mod grid;
+pub mod groups;
 pub mod labels;
 mod lbfgs;
 mod lengths;

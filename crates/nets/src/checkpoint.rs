@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use crate::course::Course;
 use crate::history::Epoch;
@@ -28,6 +29,25 @@ struct Text {
     steps: u64,
     epochs: Vec<Epoch>,
     best: Option<(f64, usize)>,
+    /// hash of everything else here and of all numbers; absent in checkpoints of version 0.1.0
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    hash: Option<String>,
+}
+
+impl Text {
+    /// The hash of what is here and of the numbers of `state`, which may be in any order.
+    fn hash_with(&self, state: &State) -> String {
+        let mut hash = blake3::Hasher::new();
+        hash.update(json!([self.key, self.steps, self.epochs, self.best]).to_string().as_bytes());
+        let mut entries: Vec<_> = state.iter().collect();
+        entries.sort_unstable_by_key(|(name, ..)| name);
+        for (name, shape, values) in entries {
+            hash.update(format!("/{name} {shape:?}").as_bytes());
+            let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+            hash.update(&bytes);
+        }
+        hash.finalize().to_hex().to_string()
+    }
 }
 
 /// Says which training this is: recipe, network, GPU, items, targets, rows, what it begins with.
@@ -97,12 +117,14 @@ pub(crate) fn save(
             state.push((name, vec![values.len()], values.clone()));
         }
     }
-    let text = Text {
+    let mut text = Text {
         key: key.into(),
         steps: trainer.optimiser.steps,
         epochs: epochs.to_vec(),
         best: best.as_ref().map(|b| (b.0, b.1)),
+        hash: None,
     };
+    text.hash = Some(text.hash_with(&state));
     let content = |reason| WeightsError::Content { path: path.into(), reason };
     let text = serde_json::to_string(&text).map_err(|e| content(e.to_string()))?;
     let texts = HashMap::from([(ENTRY.to_owned(), text)]);
@@ -133,8 +155,12 @@ pub(crate) fn resume(
                 .into(),
         ));
     }
+    let state = weights::from_safetensors(&bytes).map_err(content)?;
+    if text.hash.as_ref().is_some_and(|hash| *hash != text.hash_with(&state)) {
+        return Err(content("the checkpoint is damaged: remove it".into()));
+    }
     let mut parts: HashMap<String, State> = HashMap::new();
-    for (name, shape, values) in weights::from_safetensors(&bytes).map_err(content)? {
+    for (name, shape, values) in state {
         let (part, name) = name.split_once('.').unwrap_or(("", &name));
         parts.entry(part.into()).or_default().push((name.into(), shape, values));
     }

@@ -89,7 +89,8 @@ pub fn cross_validate(
 /// Items trained on, items that choose the epoch, and the group that these are, where they are one.
 ///
 /// # Errors
-/// A validation group without groups; a fifth of too few items.
+/// A validation group without groups, or of groups each of which has all items of a class; a fifth of too few
+/// items; no held-out items to choose the epoch by, as published.
 pub fn watched(
     data: Data<'_>,
     fold: &FoldItems,
@@ -97,6 +98,11 @@ pub fn watched(
 ) -> Result<(Vec<usize>, Vec<usize>, Option<String>)> {
     match recipe.select {
         Select::Last => Ok((fold.train.clone(), Vec::new(), None)),
+        Select::Published if fold.test.is_empty() => Err(NetError::Targets(
+            "select = published chooses the epoch by the fold that is held out, which only \
+             cross-validation has: use last, validation or split"
+                .into(),
+        )),
         Select::Published => Ok((fold.train.clone(), fold.test.clone(), None)),
         Select::Split => {
             let held = fifth(data, fold, recipe);
@@ -113,8 +119,8 @@ pub fn watched(
         Select::Validation => {
             let refuse = || {
                 NetError::Targets(
-                    "select = validation holds out a group of the training items: it needs groups, \
-                     at least two of them in training"
+                    "select = validation holds out a group of the training items: it needs groups \
+                     (--groups), at least two of them in training"
                         .into(),
                 )
             };
@@ -125,6 +131,15 @@ pub fn watched(
             if names.len() < 2 {
                 return Err(refuse());
             }
+            let found = names.len();
+            names.retain(|&name| !holds_a_class(data, groups, fold, name));
+            if names.is_empty() {
+                return Err(NetError::Targets(format!(
+                    "select = validation holds out a group of the training items, but each of the {found} \
+                     groups in training has all items of some class, which would not be learned: name other \
+                     groups (--groups), or use last or split"
+                )));
+            }
             let stream = Stream::new(recipe.seed, &format!("validation group of {}", fold.name));
             let chosen = names[stream.below(0, names.len())];
             let (held, train): (Vec<usize>, Vec<usize>) =
@@ -132,6 +147,15 @@ pub fn watched(
             Ok((train, held, Some(chosen.clone())))
         }
     }
+}
+
+/// Whether all training items of some class are of one group.
+fn holds_a_class(data: Data<'_>, groups: &[String], fold: &FoldItems, name: &str) -> bool {
+    let mut items = vec![[0_usize; 2]; data.n_classes];
+    for &item in &fold.train {
+        items[data.classes[item]][usize::from(groups[item] == name)] += 1;
+    }
+    items.iter().any(|[others, own]| *others == 0 && *own > 0)
 }
 
 /// A random fifth of the training items of each class, ascending.

@@ -106,7 +106,7 @@ fn training<'t>(
     Ok(Training { target: TARGET, groups, recipe, checkpoints, weights: None, device: Device::Cpu })
 }
 
-/// A network trained on recordings, and the recordings that were left out; `kind` is what the labels
+/// A network trained on recordings, what is odd about them, and those that were left out; `kind` is what the labels
 /// are in numpy.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "one private caller, by name")]
@@ -119,7 +119,7 @@ pub(crate) fn train_network(
     checkpoints: Option<PathBuf>,
     progress: Option<Py<PyAny>>,
     jobs: Option<usize>,
-) -> PyResult<(PyTrainedNetwork, Failed)> {
+) -> PyResult<(PyTrainedNetwork, Option<String>, Failed)> {
     let training = training(&rows, recipe, checkpoints.as_deref())?;
     let (examples, left_out) = examples(py, name, &rows, jobs)?;
     let mut teller = Teller::new(progress);
@@ -129,7 +129,7 @@ pub(crate) fn train_network(
     teller.end()?;
     let mut model = trained.map_err(error)?.model;
     model.header.provenance["label_kind"] = kind.into();
-    Ok((PyTrainedNetwork(model), left_out))
+    Ok((PyTrainedNetwork(model), examples.doubt(), left_out))
 }
 
 /// Scores of a network on recordings that it was not trained on: the report as JSON, the predictions
@@ -157,6 +157,7 @@ pub(crate) fn cross_validate_network(
     teller.end()?;
     let validated = validated.map_err(error)?;
     warnings.extend(validated.caution.map(String::from));
+    warnings.extend(examples.doubt());
     let held_out = Path::new("the held-out predictions");
     let predictions = validated.predictions(&examples.table.ids, held_out);
     let scores = compute(py, || validation::held_out(&predictions))?.map_err(value_error)?;

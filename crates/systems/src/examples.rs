@@ -193,6 +193,13 @@ impl Examples {
         &self.items
     }
 
+    /// What makes the items doubtful, in words: recordings of several sample rates whose features keep them.
+    pub fn doubt(&self) -> Option<String> {
+        let Heard { config, trained_on } = self.heard.as_ref()?;
+        let mixed = trained_on.as_ref()?.mixed_rates(&config.to_value())?;
+        Some(format!("{mixed}; resample them to one rate first"))
+    }
+
     /// Whether the items were made of recordings.
     pub fn is_of_recordings(&self) -> bool {
         self.heard.is_some()

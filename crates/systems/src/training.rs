@@ -31,7 +31,7 @@ use crate::examples::Examples;
 pub struct Training<'a> {
     /// label column to learn
     pub target: &'a str,
-    /// label column of groups that must not be split
+    /// label column of groups that must not be split; otherwise container or group, where there is one
     pub groups: Option<&'a str>,
     /// how the network is trained
     pub recipe: Recipe,
@@ -167,7 +167,9 @@ impl Training<'_> {
         require_whole(&recipe, examples)?;
         let (labels, classes) = table.classes(self.target)?;
         let y = examples.classes(&classes);
-        let groups = self.groups.map(|groups| table.column(groups)).transpose()?;
+        let groups =
+            self.groups.or_else(|| corsmal_models::groups::usual(table, (&labels, &classes)));
+        let groups = groups.map(|groups| table.column(groups)).transpose()?;
         let groups = groups.map(|groups| examples.of_items(&groups));
         let groups = groups.as_deref();
         let state = self.weights.map(|weights| weights.state_for(definition, &labels));

@@ -61,6 +61,9 @@ pub struct Example {
     pub learned: BTreeMap<String, f64>,
 }
 
+/// What the mean of a category is called among methods.
+pub const PRIOR: &str = "prior";
+
 /// An estimate and its uncertainty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fused {
@@ -164,7 +167,7 @@ impl Fusion {
             })
             .collect();
         if let Some(&[mean, deviation]) = self.priors.get(&category) {
-            parts.push(("prior".into(), mean, deviation));
+            parts.push((PRIOR.into(), mean, deviation));
         }
         let weight: f64 = parts.iter().map(|(_, _, d)| d.powi(-2)).sum();
         let sum: f64 = parts.iter().map(|(_, value, d)| value * d.powi(-2)).sum();

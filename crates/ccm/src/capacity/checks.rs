@@ -20,7 +20,8 @@ pub(crate) fn require_own_tables(
     let mut owners: HashMap<PathBuf, &Recording> = HashMap::new();
     for recording in recordings {
         let views = Views::of(recording, detections);
-        let Some(table) = views.table() else { continue };
+        // Two tables are said of their recording.
+        let Ok(Some(table)) = views.table() else { continue };
         if let Some(other) = owners.insert(table.clone(), recording) {
             let own = |recording| {
                 let table = Views::of(recording, detections).table_in(folder);

@@ -17,11 +17,13 @@ use crate::submission::RowKey;
 /// prior, or is -1, is not an estimate. Returns the recordings and how many have the prior.
 ///
 /// # Errors
-/// [`CcmError`] for unreadable files, recordings that a file lacks, a prior that is not a number, and an output that
+/// [`CcmError`] for unreadable files, recordings that a file lacks, a prior that is no capacity, and an output that
 /// cannot be written.
 pub fn combine_files(inputs: &[PathBuf], prior: f64, out: &Path) -> Result<(usize, usize)> {
-    if !prior.is_finite() {
-        return Err(CcmError::Request(format!("a prior of {prior}; expected a number in mL")));
+    if !prior.is_finite() || (prior < 0.0 && prior != -1.0) {
+        return Err(CcmError::Request(format!(
+            "a prior of {prior}; expected a number of mL of at least 0, or -1 for none"
+        )));
     }
     let mut estimates: BTreeMap<Named, Vec<f64>> = BTreeMap::new();
     let mut tables = Vec::with_capacity(inputs.len());

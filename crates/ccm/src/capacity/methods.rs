@@ -284,10 +284,13 @@ pub(super) fn geometry(
     Ok(Geometry { estimates, sizes: measured, frames })
 }
 
+/// Frames with depth images that are searched for depth of the object.
+const LOOKED: usize = 10;
+
 /// Volume of the upright box around the depth of the side views, over the first frames that have it.
 fn upright(views: &Views, detections: &[Detection]) -> Result<(f64, usize), Problem> {
     const FRAMES: usize = 2;
-    let mut logs = Vec::new();
+    let (mut logs, mut looked) = (Vec::new(), 0);
     for frame in views.seen(detections, &[1, 2])? {
         // One side alone says little about depth. A mask is found at once, a depth image takes 60 ms.
         let parts = || -> Result<Vec<(Depth, Mask, Camera)>, Problem> {
@@ -303,8 +306,14 @@ fn upright(views: &Views, detections: &[Detection]) -> Result<(f64, usize), Prob
         };
         let of: Vec<DepthView<'_>> =
             parts.iter().map(|(depth, mask, camera)| DepthView { depth, mask, camera }).collect();
-        logs.push(cloud::upright_box(&of)?.volume.max(1.0).ln());
-        if logs.len() == FRAMES {
+        match cloud::upright_box(&of).map_err(Problem::from) {
+            Ok(found) => logs.push(found.volume.max(1.0).ln()),
+            // Depth cameras lose glass in single frames.
+            Err(Problem::Missing(_)) => {}
+            Err(damaged) => return Err(damaged),
+        }
+        looked += 1;
+        if logs.len() == FRAMES || looked == LOOKED {
             break;
         }
     }

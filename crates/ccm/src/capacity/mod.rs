@@ -18,6 +18,7 @@ mod views;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
+use corsmal_vision::fused::PRIOR;
 use rayon::prelude::*;
 
 use crate::dataset::{Container, DataSet, Recording, Subset};
@@ -133,20 +134,28 @@ fn estimate(views: &Views, options: &CapacityOptions) -> std::result::Result<Est
             let fusion = model.fusion.as_ref().ok_or_else(without_model)?;
             let vote = methods::vote(&detections, options.seed)?;
             let found = methods::geometry(views, &detections, options.seed)?;
-            let (mut estimates, sizes, frames) = (found.estimates, found.sizes, found.frames);
+            let (mut estimates, sizes, mut frames) = (found.estimates, found.sizes, found.frames);
             if let Ok(normal) = model.m3.predict(&vote) {
                 estimates.insert("m3".into(), normal.mean.exp());
+                frames = frames.max(vote.frames);
             }
             let fused = fusion.estimate(vote.category, &estimates).ok_or_else(|| {
                 Problem::Missing(format!("the model has learned no {}", vote.category.name()))
             })?;
             let factor = fused.deviation.exp();
+            let measured = fused.methods.iter().any(|method| method != PRIOR);
+            let category = vote.category.name();
+            let substitute = (!measured).then(|| {
+                format!(
+                    "prior: no method that the model has learned for a {category} has an estimate"
+                )
+            });
             Ok(Estimate {
                 capacity: fused.capacity,
                 band: Some([fused.capacity / factor, fused.capacity * factor]),
                 frames,
                 sizes,
-                substitute: None,
+                substitute,
             })
         }
     }

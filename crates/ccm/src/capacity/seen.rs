@@ -12,7 +12,7 @@ impl Views {
     /// # Errors
     /// The table is damaged, or about frames that a video does not have.
     pub fn detections(&self) -> Result<Option<Vec<Detection>>, Problem> {
-        let Some(path) = self.table() else { return Ok(None) };
+        let Some(path) = self.table()? else { return Ok(None) };
         let detections = read_detections(&path)?;
         self.require_frames(&detections)
             .map_err(|reason| Problem::Damaged(format!("{}: {reason}", path.display())))?;

@@ -148,17 +148,33 @@ impl Views {
     }
 
     /// Where its table of detections is, if there is one.
-    pub(super) fn table(&self) -> Option<PathBuf> {
+    ///
+    /// # Errors
+    /// There are two, and nothing says which is right.
+    pub(super) fn table(&self) -> Result<Option<PathBuf>, Problem> {
         let own = self.base.join("detections");
         let folder = self.detections.as_ref().unwrap_or(&own);
         let mut folders = vec![folder.clone()];
         if self.detections.is_some() {
             folders.insert(0, folder.join(&self.group));
         }
-        let tables = folders.iter().flat_map(|folder| {
-            ["csv", "json"].map(|extension| folder.join(format!("{}.{extension}", self.stem)))
-        });
-        tables.into_iter().find(|path| path.is_file())
+        for folder in folders {
+            let tables =
+                ["csv", "json"].map(|extension| folder.join(format!("{}.{extension}", self.stem)));
+            let mut there = tables.into_iter().filter(|path| path.is_file());
+            match (there.next(), there.next()) {
+                (Some(one), Some(other)) => {
+                    return Err(Problem::Damaged(format!(
+                        "{} and {} are tables of the same recording: remove one",
+                        one.display(),
+                        other.display()
+                    )));
+                }
+                (Some(table), None) => return Ok(Some(table)),
+                (None, _) => {}
+            }
+        }
+        Ok(None)
     }
 
     /// A depth image of a view.

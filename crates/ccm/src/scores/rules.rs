@@ -158,7 +158,9 @@ impl<'a> Truth<'a> {
         ];
         let withheld = self.withheld_mass(|row| row.filling_mass_g < 0.0);
         if withheld.is_none() {
-            let masses = self.masses_of_estimates(input);
+            // exp(-m) would be more than 1.
+            let none = |mass: f64| if mass < 0.0 { -1.0 } else { mass };
+            let masses: Vec<f64> = self.masses_of_estimates(input).into_iter().map(none).collect();
             let mass = regression::filling_mass(&self.filling_mass, &masses);
             values.push(("mass", mass * input.addressed as f64 / 3.0));
         }

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod gaps;
 mod published;
 mod refused;
 

@@ -117,16 +117,10 @@ fn train(args: &Args) -> Result<ExitCode, Failure> {
         "choice": choice,
     });
     let trained_on = table.trained_on();
-    let own_rate = table.config["signal"]["sample_rate"].as_f64() == Some(0.0);
-    if let Some(rates) =
-        trained_on.as_ref().map(|t| &t.sample_rates).filter(|r| own_rate && r.len() > 1)
-    {
-        let rates: Vec<String> = rates.iter().map(u32::to_string).collect();
+    if let Some(mixed) = trained_on.as_ref().and_then(|t| t.mixed_rates(&table.config)) {
         eprintln!(
-            "warning: {}: the recordings have sample rates of {} Hz, so their features differ; \
-             extract with --set signal.sample_rate={} to resample them",
+            "warning: {}: {mixed}; extract with --set signal.sample_rate={} to resample them",
             table.path.display(),
-            rates.join(", "),
             usual_rate(&table)
         );
     }

@@ -162,3 +162,24 @@ fn a_network_learns_from_recordings_and_hears_them() {
     let message = refused(&[&level[..], &["-o", text(&path("no.safetensors"))]].concat());
     assert!(message.contains("takes m4_type's features of each window"), "{message}");
 }
+
+/// Networks whose features keep the rate of recordings learned of both, without a word.
+#[test]
+fn recordings_of_several_rates_are_said_to_differ() {
+    let folder = tempfile::tempdir().unwrap();
+    let audio = folder.path().join("audio");
+    for (class, name) in ["tone", "noise"].into_iter().enumerate() {
+        for (take, rate) in [44_100, 22_050, 44_100].into_iter().enumerate() {
+            tone(&audio.join(name).join(format!("{take}.wav")), class, 1.0, rate);
+        }
+    }
+    let model = folder.path().join("m.safetensors");
+    for (net, differ) in [("m1", true), ("mel-cnn", false)] {
+        let learn = ["train", text(&audio), "--net", net, "--labels", "folders", "--overwrite"];
+        let output = run(&[&learn[..], &["--set", "epochs=1", "-o", text(&model)]].concat());
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{message}");
+        let expected = "have sample rates of 22050, 44100 Hz, so their features differ; resample";
+        assert_eq!(message.contains(expected), differ, "{net}: {message}");
+    }
+}

@@ -150,7 +150,6 @@ fn what_a_network_cannot_learn_from_is_refused() {
     let level = ["--net", "m5-vggish-level", "--target", "level"];
     refuse(&[&level[..], &["--set", "epoch=3"]].concat(), "epochs");
     refuse(&[&level[..], &["--set", "lr=-1"]].concat(), "above 0");
-    refuse(&[&level[..], &["--set", "select=validation"]].concat(), "groups");
     refuse(&[&level[..], &["--set", "recipe=book"]].concat(), "code or paper");
     refuse(&[&level[..], &["--device", "cuda"]].concat(), "[possible values: cpu, gpu]");
     if !cfg!(feature = "gpu") {
@@ -258,6 +257,10 @@ fn the_group_that_chose_the_epoch_is_named() {
     let learn = ["train", text(&features), "--net", "m5-vggish-level", "--target", "level"];
     let by = ["--groups", "container", "--set", "select=validation", "--set", "epochs=2"];
     let said = done(&[&learn[..], &by, &["-o", text(&model)]].concat());
+    // Without --groups, it is the column that is called so.
+    let usual = folder.path().join("usual.safetensors");
+    done(&[&learn[..], &by[2..], &["-o", text(&usual)]].concat());
+    assert!(std::fs::read(&usual).unwrap() == std::fs::read(&model).unwrap());
     let (_, group) = said.split_once("the best on container ").unwrap();
     let group = group.split(',').next().unwrap();
     assert!(said.contains("which was not trained on"), "{said}");

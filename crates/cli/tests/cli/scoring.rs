@@ -303,6 +303,8 @@ fn tables_with_two_columns_of_one_name_are_refused() {
     std::fs::write(&file, "fileName,capacity[mL],Capacity[mL]\nid1_0000.png,100,200\n").unwrap();
     let out = folder.path().join("c.csv");
     let combine = ["capacity", "combine", "--in", text(&file), "--out", text(&out)];
+    let message = refused(&[&combine[..], &["--prior=-5"]].concat());
+    assert!(message.contains("of at least 0, or -1 for none"), "{message}");
     assert!(refused(&combine).contains("two columns are named"));
 }
 
@@ -335,4 +337,7 @@ fn a_bad_number_is_said_to_be_true_or_an_estimate() {
         let message = refused(&["score", text(&file), "--numeric"]);
         assert!(message.contains(&format!("{words} \"1e\" is not a number")), "{message}");
     }
+    std::fs::write(&file, "id,true,predicted\na,1,-1\nb,3,-1\n").unwrap();
+    let message = refused(&["score", text(&file), "--numeric"]);
+    assert!(message.contains("no row has an estimate (-1 stands for none)"), "{message}");
 }

@@ -204,6 +204,9 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         };
         let estimates: Vec<Option<f64>> =
             self.rows.iter().enumerate().map(estimate).collect::<Result<_, PredictionError>>()?;
+        if estimates.iter().all(Option::is_none) {
+            return Err(self.content("no row has an estimate (-1 stands for none)"));
+        }
         let scores = NumericScores::new(&truths, &estimates, drawn, (how.draws, how.seed))
             .map_err(|e| self.model(e))?;
         Ok(NumericScores { warnings: self.unmatched.iter().cloned().collect(), ..scores })

@@ -85,3 +85,46 @@ fn a_fifth_of_too_few_rows_is_refused() {
     let error = watched(data, &fold, &recipe(1, Select::Split)).unwrap_err();
     assert!(matches!(&error, NetError::Targets(text) if text.contains("must have 3")), "{error}");
 }
+
+/// The epoch was chosen by a class that the network had never seen.
+#[test]
+fn a_validation_group_leaves_items_of_every_class() {
+    let (items, classes) = noise(12);
+    let watch = |groups: &[String], seed: u32| {
+        let data = Data {
+            items: &items,
+            classes: &classes,
+            n_classes: 3,
+            groups: Some(groups),
+            weights: None,
+            device: &Device::Cpu,
+        };
+        let fold = FoldItems { name: "f".into(), train: (0..12).collect(), test: vec![] };
+        watched(data, &fold, &Recipe { seed: seed.into(), ..recipe(1, Select::Validation) })
+    };
+    // All of the third class is in one group.
+    let group = |i: usize| if i % 3 == 2 { "whole".into() } else { format!("g{}", i / 3) };
+    let mixed: Vec<String> = (0..12).map(group).collect();
+    let chosen: Vec<String> = (0..40).map(|seed| watch(&mixed, seed).unwrap().2.unwrap()).collect();
+    assert!(chosen.iter().all(|group| group != "whole"));
+    assert!((0..4).all(|g| chosen.contains(&format!("g{g}"))), "{chosen:?}");
+    let one_each: Vec<String> = classes.iter().map(|class| format!("g{class}")).collect();
+    let error = watch(&one_each, 1).unwrap_err().to_string();
+    assert!(error.contains("each of the 3 groups") && error.contains("--groups"), "{error}");
+}
+
+#[test]
+fn an_epoch_chosen_as_published_needs_a_fold() {
+    let (items, classes) = noise(6);
+    let data = Data {
+        items: &items,
+        classes: &classes,
+        n_classes: 3,
+        groups: None,
+        weights: None,
+        device: &Device::Cpu,
+    };
+    let fold = FoldItems { name: "f".into(), train: (0..6).collect(), test: vec![] };
+    let error = watched(data, &fold, &recipe(1, Select::Published)).unwrap_err();
+    assert!(error.to_string().contains("only cross-validation has"), "{error}");
+}

@@ -149,6 +149,15 @@ fn a_training_that_was_stopped_goes_on_to_the_same_bytes() {
     assert!(matches!(go(task, Some(&path), 3), Err(NetError::Stopped { epochs: 3 })));
     assert!(go(task, Some(&path), 9).unwrap() == undisturbed);
 
+    // One bit: it ended in another network, without a word.
+    let sound = std::fs::read(&path).unwrap();
+    let mut damaged = sound.clone();
+    damaged[sound.len() / 4 * 2] ^= 1;
+    std::fs::write(&path, &damaged).unwrap();
+    let text = go(task, Some(&path), 9).unwrap_err().to_string();
+    assert!(text.contains("damaged: remove it"), "{text}");
+    std::fs::write(&path, &sound).unwrap();
+
     let other = Task { train: &train[..5], ..task };
     let text = go(other, Some(&path), 9).unwrap_err().to_string();
     assert!(text.contains("training.safetensors") && text.contains("another training"), "{text}");

@@ -153,13 +153,14 @@ impl Camera {
         std::array::from_fn(|axis| -along(axis).sum::<f64>())
     }
 
-    /// Pixel (column, row) of a point in m; computed as OpenCV's `projectPoints` does.
+    /// Pixel (column, row) of a point in m; computed as OpenCV's `projectPoints` does, but for the skew, which that
+    /// leaves out.
     pub fn project(&self, point: [f64; 3]) -> [f64; 2] {
         let turned = matrix::times(&self.rotation, point);
         let [x, y, z] = std::array::from_fn(|i| turned[i] + self.translation[i]);
         let over = if z == 0.0 { 1.0 } else { 1.0 / z };
         let k = &self.intrinsic;
-        [x * over * k[0][0] + k[0][2], y * over * k[1][1] + k[1][2]]
+        [x * over * k[0][0] + y * over * k[0][1] + k[0][2], y * over * k[1][1] + k[1][2]]
     }
 
     /// Distance of a point along the camera's axis in m; below 0 behind the camera.

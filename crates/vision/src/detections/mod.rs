@@ -113,17 +113,20 @@ fn beside(table: &Path, file: &str) -> PathBuf {
     table.parent().unwrap_or(Path::new("")).join(file)
 }
 
+/// A whole number without what pandas may write behind it: also 8.0.
+fn whole(number: &str) -> &str {
+    number.strip_suffix(".0").unwrap_or(number)
+}
+
 fn detection(
     [frame, view, label]: [&str; 3],
     score: f64,
     bounds: [f64; 4],
     mask: Segmentation,
 ) -> std::result::Result<Detection, String> {
-    // As pandas writes them: also 8.0.
-    let whole = frame.strip_suffix(".0").unwrap_or(frame);
-    let number = whole.parse().ok().filter(|&f| f <= MAX_FRAME);
+    let number = whole(frame).parse().ok().filter(|&f| f <= MAX_FRAME);
     let frame = number.ok_or_else(|| format!("'{frame}' is not a frame number"))?;
-    let number = view.strip_prefix('c').unwrap_or(view).parse().ok();
+    let number = view.strip_prefix('c').unwrap_or(whole(view)).parse().ok();
     let view = number
         .filter(|v| (1..=4).contains(v))
         .ok_or_else(|| format!("'{view}' is not a view (1 to 4, or c1 to c4)"))?;
@@ -180,7 +183,7 @@ mod tests {
 
     #[test]
     fn csv_and_json_say_the_same() {
-        let csv = format!("{HEADER}0,c1,47,0.9,0,1,2.5,3,m.png\n8,2,Wine Glass,0.5,0,0,1,1,\n");
+        let csv = format!("{HEADER}0,c1,47,0.9,0,1,2.5,3,m.png\n8.0,2.0,Wine Glass,0.5,0,0,1,1,\n");
         let json = r#"[{"frame":0,"view":1,"label":"cup","score":0.9,"box":[0,1,2.5,3],"mask":"m.png"},
             {"frame":8,"view":"c2","label":46,"score":0.5,"box":[0,0,1,1]}]"#;
         // With a byte-order mark, too.

@@ -19,7 +19,8 @@ Example, M5's combination of its two frames:
       capacity_estimation_20_public_test.csv --out combined.csv
 
 The estimate of a recording is the mean of its estimates in the files, or the prior if no
-file has one. An estimate equal to the prior counts as none, as in the published program.")]
+file has one. An estimate equal to the prior, or to the published one of 734.94 mL, counts as none,
+as in the published program.")]
 pub struct Args {
     /// Tables with the columns fileName and `capacity[mL]`.
     #[arg(long = "in", value_name = "CSV", num_args = 1.., required = true)]
