@@ -261,7 +261,8 @@ def embed(
 
     Examples
     --------
-    >>> corsmal_feat.nets.embed("m2-type", ["rice.wav"], "vggish.pth")
+    >>> corsmal_feat.nets.write_weights("one.safetensors", {"bias": np.ones(3)})
+    >>> corsmal_feat.nets.embed("m2-type", ["rice.wav"], "one.safetensors")
     Traceback (most recent call last):
     ...
     corsmal_feat.errors.ParameterError: m2_type gives classes, not embeddings; vggish gives embeddings
