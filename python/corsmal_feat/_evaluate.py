@@ -77,7 +77,8 @@ def evaluate(
     Raises
     ------
     ParameterError
-        A file cannot be read, its rows do not fit the annotations, or a number is out of range.
+        A file is damaged or of another form, its rows do not fit the annotations, or a number is
+        out of range.
     MissingFileError
         A file does not exist.
 

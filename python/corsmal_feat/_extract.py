@@ -279,7 +279,7 @@ def interleaved(y: Any) -> npt.NDArray[np.float32]:
     with np.errstate(over="ignore"):
         narrow = np.ascontiguousarray(samples.T, dtype=np.float32)
     if samples.dtype == np.float64:
-        # What overflows is finite, and too loud.
-        beyond = np.isinf(narrow) & np.isfinite(samples.T)
+        # What overflows was finite, and is too loud.
+        beyond = np.isinf(narrow)
         narrow[beyond] = np.copysign(np.finfo(np.float32).max, narrow[beyond])
     return narrow

@@ -82,7 +82,8 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         count = len(columns[0][1]) - 1
         classes, positions = labels_of(y, count, type(self).__name__)
         held = _watched(watched, count)
-        learned = set(positions[[i for i in range(count) if i not in held]].tolist())
+        rows = [i for i in range(count) if i not in held]
+        learned = set(positions[rows].tolist())
         if unlearned := [str(c) for i, c in enumerate(classes.tolist()) if i not in learned]:
             warn(f"all items of {', '.join(unlearned)} are watched: nothing is learned of them")
         changes = settings(self.recipe)
@@ -93,12 +94,12 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
             self.network,
             columns,
             positions.tolist(),
-            [i for i in range(count) if i not in held],
+            rows,
             sorted(held),
             [str(c) for c in classes.tolist()],
             recipe,
             None if self.checkpoint is None else os.fspath(self.checkpoint),
-            json.dumps({"rows": count - len(held), "label_kind": label_kind(classes)}),
+            json.dumps({"rows": len(rows), "label_kind": label_kind(classes)}),
             self.progress,
         )
         self.classes_ = classes
@@ -184,7 +185,7 @@ def _watched(watched: Iterable[int] | npt.NDArray[Any] | None, count: int) -> se
         raise ParameterError(f"watched must hold indices of items, not {watched!r}")
     given = list(given)
     for index in given:
-        if isinstance(index, int | np.integer) and not 0 <= index < count:
+        if isinstance(index, int | float | np.number) and not 0 <= index < count:
             raise ParameterError(f"watched must hold indices of {count} items, not {index}")
     return {size("watched", i, 0) for i in given}
 

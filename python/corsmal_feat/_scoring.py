@@ -269,6 +269,8 @@ def score(
     ------
     ParameterError
         A column is missing, or a recording has no label.
+    MissingFileError
+        A file does not exist.
 
     Examples
     --------

@@ -143,6 +143,13 @@ def load_depth(path: StrPath) -> npt.NDArray[np.uint16]:
     uint16 [shape=(height, width)]
         Depth in mm; 0 where nothing was measured.
 
+    Raises
+    ------
+    ParameterError
+        The file cannot be read, or is no 16-bit PNG.
+    MissingFileError
+        There is no such file.
+
     Examples
     --------
     >>> corsmal_feat.vision.load_depth("c1_depth.png").max()

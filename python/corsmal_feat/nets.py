@@ -222,6 +222,13 @@ def load(path: StrPath) -> TrainedNetwork:
     -------
     TrainedNetwork
 
+    Raises
+    ------
+    MissingFileError
+        There is no such file.
+    ModelError
+        It is no trained network, or damaged.
+
     Examples
     --------
     >>> corsmal_feat.nets.load("pouring.safetensors").predict(["rice.wav", "water.wav"]).tolist()
@@ -289,6 +296,13 @@ def read_weights(path: StrPath) -> dict[str, Singles]:
     -------
     dict
         Arrays by name.
+
+    Raises
+    ------
+    MissingFileError
+        There is no such file.
+    ModelError
+        It holds no weights.
 
     Examples
     --------

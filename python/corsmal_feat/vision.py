@@ -302,6 +302,8 @@ def m2_capacity(depth: Depth | Region, weights: StrPath) -> float | None:
     ------
     ParameterError
         The weights are for another network, or an image cannot be read.
+    MissingFileError
+        A file does not exist.
 
     Examples
     --------

@@ -206,6 +206,8 @@ def test_every_reader_names_a_missing_file(tmp_path: Path) -> None:
         lambda: cf.nets.embed("vggish", [there], nothing),
         lambda: cf.evaluate(nothing, there),
         lambda: cf.evaluate(there, nothing),
+        lambda: cf.evaluate(there, there, baseline=nothing),
+        lambda: cf.vision.m2_capacity(np.zeros((720, 1280), np.uint16), nothing),
         lambda: cf.score(there, labels=nothing),
         lambda: cf.load_model(nothing),
         lambda: cf.compare_predictions(there, nothing),

@@ -8,7 +8,7 @@ use crate::copies;
 use crate::dataset::{LabelledTable, Result};
 use crate::error::ModelError;
 use crate::groups;
-use crate::labels::{Labels, alike, is_missing, measured, missing};
+use crate::labels::{Labels, alike, is_missing, measured};
 use crate::splits::{self, Fold};
 use crate::targets::Classes;
 use crate::words::count;
@@ -18,6 +18,9 @@ const FOLDS: usize = 5;
 
 /// The recordings of windows, which no folds split unless the user names other groups.
 const RECORDING: &str = "recording";
+
+/// What to do with rows without a group, besides.
+const ELSE: &str = "; --cv 5 without --groups needs none";
 
 /// Said where there is nothing else to hold out.
 const ONE_RECORDING: &str = "all rows are parts of one recording, so training and test rows are \
@@ -123,7 +126,7 @@ impl Folds {
             CvPlan::Group(column) | CvPlan::Fold(column) => Some(column.as_str()),
             CvPlan::K(_) | CvPlan::Lists(_) => groups,
         };
-        let parts = column.map(|c| values_of(table, c)).transpose()?;
+        let parts = column.map(|c| groups::values(table, c, ELSE)).transpose()?;
         let outer = match (plan, &parts) {
             (CvPlan::Group(_) | CvPlan::Fold(_), Some(g)) => splits::leave_one_group_out(g)?,
             (CvPlan::K(k), Some(g)) => splits::group_k_fold(g, *k)?,
@@ -143,7 +146,7 @@ impl Folds {
         };
         let kept = match groups {
             Some(groups) if column != Some(groups) => {
-                let values = values_of(table, groups)?;
+                let values = groups::values(table, groups, ELSE)?;
                 refuse_split(&outer, &values, (plan, groups))?;
                 Some(values)
             }
@@ -248,22 +251,6 @@ impl Folds {
         }
         found
     }
-}
-
-/// The values of a column of groups or folds: every row has one.
-fn values_of(table: &LabelledTable, column: &str) -> Result<Vec<String>> {
-    let values = table.column(column)?;
-    let Some(first) = values.iter().position(|value| is_missing(value)) else {
-        return Ok(values);
-    };
-    let reason = format!(
-        "{} without {column} of {}, the first is {}: give every row one, leave these rows out, or use \
-         another column; --cv 5 without --groups needs none",
-        count(missing(&values), "row"),
-        values.len(),
-        table.ids[first]
-    );
-    Err(ModelError::Folds { reason }.into())
 }
 
 /// Refuses folds that hold out a part of a group.

@@ -1,8 +1,10 @@
 //! Columns whose values name groups of rows that belong together.
 
-use crate::dataset::LabelledTable;
-use crate::labels::Labels;
+use crate::dataset::{LabelledTable, Result};
+use crate::error::ModelError;
+use crate::labels::{Labels, is_missing, missing};
 use crate::targets::Classes;
+use crate::words::count;
 
 /// Columns that are groups unless the user says otherwise.
 pub(crate) const USUAL: [&str; 2] = ["container", "group"];
@@ -26,4 +28,23 @@ pub(crate) fn is_target(
 ) -> bool {
     let mut names = classes.indices().into_iter().map(|&class| &labels.names()[class]);
     table.column(column).is_ok_and(|values| values.iter().all(|value| names.next() == Some(value)))
+}
+
+/// The values of a column of groups or folds: every row has one. `otherwise` says what else can be done where not.
+///
+/// # Errors
+/// No such column; rows without a value.
+pub fn values(table: &LabelledTable, column: &str, otherwise: &str) -> Result<Vec<String>> {
+    let values = table.column(column)?;
+    let Some(first) = values.iter().position(|value| is_missing(value)) else {
+        return Ok(values);
+    };
+    let reason = format!(
+        "{} without {column} of {}, the first is {}: give every row one, leave these rows out, or use \
+         another column{otherwise}",
+        count(missing(&values), "row"),
+        values.len(),
+        table.ids[first]
+    );
+    Err(ModelError::Folds { reason }.into())
 }

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use serde_json::json;
+use serde_json::Value;
 
 use crate::course::Course;
 use crate::history::Epoch;
@@ -14,7 +14,7 @@ use crate::network::Network;
 use crate::parameters::Parameters;
 use crate::recipe::Recipe;
 use crate::trainer::Trainer;
-use crate::weights::{self, State, WeightsError};
+use crate::weights::{self, Seal, State, WeightsError};
 
 const ENTRY: &str = "corsmal-feat-checkpoint";
 
@@ -29,25 +29,6 @@ struct Text {
     steps: u64,
     epochs: Vec<Epoch>,
     best: Option<(f64, usize)>,
-    /// hash of everything else here and of all numbers; absent in checkpoints of version 0.1.0
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    hash: Option<String>,
-}
-
-impl Text {
-    /// The hash of what is here and of the numbers of `state`, which may be in any order.
-    fn hash_with(&self, state: &State) -> String {
-        let mut hash = blake3::Hasher::new();
-        hash.update(json!([self.key, self.steps, self.epochs, self.best]).to_string().as_bytes());
-        let mut entries: Vec<_> = state.iter().collect();
-        entries.sort_unstable_by_key(|(name, ..)| name);
-        for (name, shape, values) in entries {
-            hash.update(format!("/{name} {shape:?}").as_bytes());
-            let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
-            hash.update(&bytes);
-        }
-        hash.finalize().to_hex().to_string()
-    }
 }
 
 /// Says which training this is: recipe, network, GPU, items, targets, rows, what it begins with.
@@ -117,16 +98,14 @@ pub(crate) fn save(
             state.push((name, vec![values.len()], values.clone()));
         }
     }
-    let mut text = Text {
+    let text = Text {
         key: key.into(),
         steps: trainer.optimiser.steps,
         epochs: epochs.to_vec(),
         best: best.as_ref().map(|b| (b.0, b.1)),
-        hash: None,
     };
-    text.hash = Some(text.hash_with(&state));
     let content = |reason| WeightsError::Content { path: path.into(), reason };
-    let text = serde_json::to_string(&text).map_err(|e| content(e.to_string()))?;
+    let text = weights::sealed(&text, &state).map_err(content)?;
     let texts = HashMap::from([(ENTRY.to_owned(), text)]);
     let bytes = weights::to_safetensors(&state, Some(texts)).map_err(content)?;
     corsmal_files::draft::write(path, &bytes)
@@ -147,7 +126,9 @@ pub(crate) fn resume(
     let text = weights::safetensors_text(&bytes, ENTRY)
         .map_err(content)?
         .ok_or_else(|| content("not a training checkpoint".into()))?;
-    let text: Text = serde_json::from_str(&text).map_err(|e| content(e.to_string()))?;
+    let mut text: Value = serde_json::from_str(&text).map_err(|e| content(e.to_string()))?;
+    let seal = Seal::take(&mut text);
+    let text: Text = serde_json::from_value(text).map_err(|e| content(e.to_string()))?;
     if text.key != key {
         return Err(content(
             "the checkpoint is from another training run (recipe, items or rows differ); remove \
@@ -156,9 +137,8 @@ pub(crate) fn resume(
         ));
     }
     let state = weights::from_safetensors(&bytes).map_err(content)?;
-    if text.hash.as_ref().is_some_and(|hash| *hash != text.hash_with(&state)) {
-        return Err(content("the checkpoint is damaged: remove it".into()));
-    }
+    let damaged = |reason| content(format!("the checkpoint is {reason}; remove it"));
+    seal.check(&state).map_err(damaged)?;
     let mut parts: HashMap<String, State> = HashMap::new();
     for (name, shape, values) in state {
         let (part, name) = name.split_once('.').unwrap_or(("", &name));

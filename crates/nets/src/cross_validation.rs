@@ -153,7 +153,9 @@ pub fn watched(
 fn holds_a_class(data: Data<'_>, groups: &[String], fold: &FoldItems, name: &str) -> bool {
     let mut items = vec![[0_usize; 2]; data.n_classes];
     for &item in &fold.train {
-        items[data.classes[item]][usize::from(groups[item] == name)] += 1;
+        // Impossible classes are refused later.
+        let class = data.classes.get(item).and_then(|&class| items.get_mut(class));
+        class.into_iter().for_each(|counts| counts[usize::from(groups[item] == name)] += 1);
     }
     items.iter().any(|[others, own]| *others == 0 && *own > 0)
 }

@@ -89,19 +89,19 @@ impl NetModel {
     /// # Errors
     /// A text.
     pub fn to_bytes(&self) -> std::result::Result<Vec<u8>, String> {
-        let header = serde_json::to_string(&self.header).map_err(|e| e.to_string())?;
         let all = self.network.parameters().iter();
         let state: State =
             all.map(|(d, v)| (d.name.clone(), d.shape.clone(), v.to_vec())).collect();
+        let header = weights::sealed(&self.header, &state)?;
         weights::to_safetensors(&state, Some(HashMap::from([(ENTRY.to_owned(), header)])))
     }
 
     /// From the bytes of a file, whoever wrote them.
     ///
     /// # Errors
-    /// A text when it is not a trained network of ours, or its parts do not fit.
+    /// A text when it is not a trained network of ours, is damaged, or its parts do not fit.
     pub fn from_bytes(bytes: &[u8]) -> std::result::Result<Self, String> {
-        let header: Header = weights::entry(bytes, ENTRY, FORMAT)?
+        let (header, seal): (Header, _) = weights::entry(bytes, ENTRY, FORMAT)?
             .ok_or("weights only: this file is not a network trained by corsmal-feat")?;
         header.recipe.check().map_err(|e| e.to_string())?;
         let definition = networks::classifier(&header.network).map_err(|e| e.to_string())?;
@@ -117,6 +117,7 @@ impl NetModel {
         let mut network =
             definition.build(Some(header.labels.len()), 0).map_err(|e| e.to_string())?;
         let state = weights::from_safetensors(bytes)?;
+        seal.check(&state)?;
         network.load_state(&state).map_err(|e| e.to_string())?;
         Self::new(header, network).map_err(|e| e.to_string())
     }

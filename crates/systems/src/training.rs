@@ -7,6 +7,7 @@ use corsmal_models::argmax;
 use corsmal_models::cross_validation::CrossValidation;
 use corsmal_models::folds::{CvPlan, Folds};
 use corsmal_models::fusion::WindowVotes;
+use corsmal_models::groups;
 use corsmal_models::labels::Labels;
 use corsmal_models::predictions::PredictionTable;
 use corsmal_models::scores::{ClassReport, Scores};
@@ -106,8 +107,8 @@ pub struct Trained {
     pub model: NetModel,
     /// how many items it was trained on
     pub items: usize,
-    /// the group that chose the epoch
-    pub validation_group: Option<String>,
+    /// the group that chose the epoch, and before it its column
+    pub validation_group: Option<(String, String)>,
 }
 
 /// A validation, in the terms of the classifiers'.
@@ -167,9 +168,14 @@ impl Training<'_> {
         require_whole(&recipe, examples)?;
         let (labels, classes) = table.classes(self.target)?;
         let y = examples.classes(&classes);
-        let groups =
-            self.groups.or_else(|| corsmal_models::groups::usual(table, (&labels, &classes)));
-        let groups = groups.map(|groups| table.column(groups)).transpose()?;
+        let by_group = recipe.select == Select::Validation;
+        let usual = || groups::usual(table, (&labels, &classes)).filter(|_| by_group);
+        let column = self.groups.or_else(usual);
+        let groups = column.map(|column| match by_group {
+            true => groups::values(table, column, ""),
+            false => table.column(column),
+        });
+        let groups = groups.transpose()?;
         let groups = groups.map(|groups| examples.of_items(&groups));
         let groups = groups.as_deref();
         let state = self.weights.map(|weights| weights.state_for(definition, &labels));
@@ -208,6 +214,7 @@ impl Training<'_> {
             tool_version: env!("CARGO_PKG_VERSION").into(),
         };
         let model = NetModel::new(header, network)?;
+        let validation_group = column.map(str::to_owned).zip(validation_group);
         Ok(Trained { model, items: y.len(), validation_group })
     }
 

@@ -125,8 +125,7 @@ impl Fusion {
         let methods = self.methods.iter().flat_map(|(category, of)| {
             of.iter().map(move |(name, r)| (category, name.as_str(), r.bias, r.deviation))
         });
-        let priors =
-            self.priors.iter().map(|(c, [mean, deviation])| (c, "prior", *mean, *deviation));
+        let priors = self.priors.iter().map(|(c, [mean, deviation])| (c, PRIOR, *mean, *deviation));
         for (category, of) in &self.methods {
             let odd = |e: &f64| !(0.0..=MAX_LOG).contains(e);
             let of = of.iter().find_map(|(name, r)| Some((name, r.uncorrected.filter(odd)?)));

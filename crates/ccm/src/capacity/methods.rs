@@ -233,8 +233,8 @@ pub(super) struct Geometry {
     pub(super) estimates: BTreeMap<String, f64>,
     /// Sizes from LoDE.
     pub(super) sizes: Option<Sizes>,
-    /// Frames of the method that used most.
-    pub(super) frames: usize,
+    /// How many frames each used.
+    pub(super) frames: BTreeMap<String, usize>,
 }
 
 /// All estimates of the methods that need no training.
@@ -245,7 +245,7 @@ pub(super) fn geometry(
 ) -> Result<Geometry, Problem> {
     let mut estimates = BTreeMap::new();
     let mut measured = None;
-    let mut frames = 0;
+    let mut frames = BTreeMap::new();
     // What one method lacks another may not need; damage is a failure of the recording.
     let missing = |problem: Problem| match problem {
         Problem::Missing(_) => Ok(()),
@@ -262,7 +262,7 @@ pub(super) fn geometry(
                 estimates.insert("lode".into(), mean(&|d| d.capacity));
                 estimates.insert("profile".into(), mean(&lode::Dimensions::bowl_capacity));
                 measured = Some(sizes(&found));
-                frames = found.len();
+                frames.extend(["lode", "profile"].map(|name| (name.into(), found.len())));
             }
         }
         Err(problem) => missing(problem)?,
@@ -270,14 +270,14 @@ pub(super) fn geometry(
     match m4(views, detections, Outliers::Kept, seed) {
         Ok(found) => {
             estimates.insert("cuboid".into(), found.capacity);
-            frames = frames.max(found.frames);
+            frames.insert("cuboid".into(), found.frames);
         }
         Err(problem) => missing(problem)?,
     }
     match upright(views, detections) {
         Ok((volume, used)) => {
             estimates.insert("upright".into(), volume);
-            frames = frames.max(used);
+            frames.insert("upright".into(), used);
         }
         Err(problem) => missing(problem)?,
     }

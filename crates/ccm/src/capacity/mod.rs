@@ -137,13 +137,14 @@ fn estimate(views: &Views, options: &CapacityOptions) -> std::result::Result<Est
             let (mut estimates, sizes, mut frames) = (found.estimates, found.sizes, found.frames);
             if let Ok(normal) = model.m3.predict(&vote) {
                 estimates.insert("m3".into(), normal.mean.exp());
-                frames = frames.max(vote.frames);
+                frames.insert("m3".into(), vote.frames);
             }
             let fused = fusion.estimate(vote.category, &estimates).ok_or_else(|| {
                 Problem::Missing(format!("the model has learned no {}", vote.category.name()))
             })?;
             let factor = fused.deviation.exp();
             let measured = fused.methods.iter().any(|method| method != PRIOR);
+            let frames = fused.methods.iter().filter_map(|method| frames.get(method)).max();
             let category = vote.category.name();
             let substitute = (!measured).then(|| {
                 format!(
@@ -153,7 +154,7 @@ fn estimate(views: &Views, options: &CapacityOptions) -> std::result::Result<Est
             Ok(Estimate {
                 capacity: fused.capacity,
                 band: Some([fused.capacity / factor, fused.capacity * factor]),
-                frames,
+                frames: frames.copied().unwrap_or(0),
                 sizes,
                 substitute,
             })

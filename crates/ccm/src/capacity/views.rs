@@ -72,7 +72,7 @@ impl Views {
     /// The colour camera of a view, 1 to 4.
     ///
     /// # Errors
-    /// There is no calibration, or it is damaged.
+    /// There is no calibration, or it is damaged, or there are different ones.
     pub fn camera(&self, view: u8) -> Result<Camera, Problem> {
         let Self { base, stem, .. } = self;
         let candidates = ["pickle", "json"].into_iter().flat_map(|extension| {
@@ -81,12 +81,22 @@ impl Views {
                 base.join(format!("view{view}/calib/{stem}.{extension}")),
             ]
         });
-        let path = candidates.into_iter().find(|path| path.is_file()).ok_or_else(|| {
+        let mut there = candidates.into_iter().filter(|path| path.is_file());
+        let path = there.next().ok_or_else(|| {
             Problem::Missing(format!(
                 "no calibration of view {view} (calib/{stem}_c{view}_calib.pickle)"
             ))
         })?;
-        Ok(Calibration::load(&path)?.rgb)
+        let camera = Calibration::load(&path)?.rgb;
+        for other in there {
+            if !Calibration::load(&other)?.rgb.is_near(&camera) {
+                let (path, other) = (path.display(), other.display());
+                return Err(Problem::Damaged(format!(
+                    "{path} and {other} are different calibrations of the same view: remove one"
+                )));
+            }
+        }
+        Ok(camera)
     }
 
     /// The frames of a view of one kind, in their order; none where there is no folder.

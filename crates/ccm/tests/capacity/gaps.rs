@@ -42,19 +42,29 @@ fn the_fused_estimate_does_without_single_frames_and_says_when_it_is_the_prior()
     assert!(reason.starts_with("prior: no method") && reason.contains(" box "), "{reason}");
 }
 
-/// The table in CSV was read, and nothing said of the other.
+/// The first was read, and nothing said of the other.
 #[test]
-fn two_tables_of_a_recording_are_refused() {
+fn two_tables_or_calibrations_that_differ_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let (base, name) = recording(dir.path(), Container::new(1).unwrap(), 0);
     write_views(&base, &name.to_string(), Container::new(1).unwrap(), name, 5).unwrap();
     let options = options(dir.path(), Method::M5);
     assert_eq!(run(&options)[0].status(), "ok");
     std::fs::write(base.join(format!("detections/{name}.csv")), b"frame,view\n").unwrap();
-    match &run(&options)[0].estimate {
-        Err(Problem::Damaged(reason)) => {
-            assert!(reason.contains("of the same recording"), "{reason}")
-        }
+    let refused = |expected: &str| match &run(&options)[0].estimate {
+        Err(Problem::Damaged(reason)) => assert!(reason.contains(expected), "{reason}"),
         other => panic!("{other:?}"),
-    }
+    };
+    refused("are tables of the same recording: remove one");
+    std::fs::remove_file(base.join(format!("detections/{name}.csv"))).unwrap();
+
+    let other = base.join(format!("view1/calib/{name}.pickle"));
+    std::fs::create_dir_all(other.parent().unwrap()).unwrap();
+    let copy = |view: u8| {
+        std::fs::copy(base.join(format!("calib/{name}_c{view}_calib.pickle")), &other).unwrap()
+    };
+    copy(1);
+    assert_eq!(run(&options)[0].status(), "ok");
+    copy(2);
+    refused("are different calibrations of the same view");
 }

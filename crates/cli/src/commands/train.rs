@@ -186,16 +186,15 @@ fn train_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
             "items": items,
             "labels": header.labels,
             "recipe": header.recipe,
-            "validation_group": validation_group,
+            "validation_group": validation_group.map(|(_, group)| group),
             "history": header.history,
         });
         println!("{}", serde_json::to_string_pretty(&summary)?);
     } else if !args.quiet {
         let (name, target) = (&header.network, &header.target);
         println!("{out}: {name}, {} numbers", model.network.parameters().count());
-        let by = validation_group.map_or(String::new(), |group| {
-            let groups = dataset.groups.as_deref().unwrap_or_default();
-            format!(", the best on {groups} {group}, which was not trained on")
+        let by = validation_group.map_or(String::new(), |(column, group)| {
+            format!(", the best on {column} {group}, which was not trained on")
         });
         let kept = header.history.kept + 1;
         println!("{target}: {}; epoch {kept} kept{by}", header.labels.join(", "));

@@ -257,12 +257,13 @@ fn the_group_that_chose_the_epoch_is_named() {
     let learn = ["train", text(&features), "--net", "m5-vggish-level", "--target", "level"];
     let by = ["--groups", "container", "--set", "select=validation", "--set", "epochs=2"];
     let said = done(&[&learn[..], &by, &["-o", text(&model)]].concat());
-    // Without --groups, it is the column that is called so.
-    let usual = folder.path().join("usual.safetensors");
-    done(&[&learn[..], &by[2..], &["-o", text(&usual)]].concat());
-    assert!(std::fs::read(&usual).unwrap() == std::fs::read(&model).unwrap());
     let (_, group) = said.split_once("the best on container ").unwrap();
     let group = group.split(',').next().unwrap();
+    // Without --groups, it is the column that is called so.
+    let usual = folder.path().join("usual.safetensors");
+    let told = done(&[&learn[..], &by[2..], &["-o", text(&usual)]].concat());
+    assert!(told.contains(&format!("the best on container {group},")), "{told}");
+    assert!(std::fs::read(&usual).unwrap() == std::fs::read(&model).unwrap());
     assert!(said.contains("which was not trained on"), "{said}");
     let shown: Value = serde_json::from_str(&done(&["inspect", text(&model), "--json"])).unwrap();
     assert!(shown.to_string().contains(&format!("\"validation_group\":\"{group}\"")), "{shown}");

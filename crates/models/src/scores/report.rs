@@ -205,7 +205,8 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         let estimates: Vec<Option<f64>> =
             self.rows.iter().enumerate().map(estimate).collect::<Result<_, PredictionError>>()?;
         if estimates.iter().all(Option::is_none) {
-            return Err(self.content("no row has an estimate (-1 stands for none)"));
+            let or = if none.is_some() { " (-1 stands for none)" } else { "" };
+            return Err(self.content(format!("no row has an estimate{or}")));
         }
         let scores = NumericScores::new(&truths, &estimates, drawn, (how.draws, how.seed))
             .map_err(|e| self.model(e))?;

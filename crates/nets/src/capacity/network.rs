@@ -80,13 +80,14 @@ impl CapacityNetwork {
                  one"
             )
         };
-        let header: Header =
+        let (header, seal): (Header, _) =
             weights::entry(bytes, ENTRY, FORMAT).map_err(|e| no_model(&e))?.ok_or_else(|| {
                 no_model("its recipe is missing; use --weights for weights without a recipe")
             })?;
         header.recipe.check().map_err(|e| e.to_string())?;
-        let network =
-            loaded(&weights::from_safetensors(bytes)?).map_err(|e| no_model(&e.to_string()))?;
+        let state = weights::from_safetensors(bytes)?;
+        seal.check(&state)?;
+        let network = loaded(&state).map_err(|e| no_model(&e.to_string()))?;
         if header.network != network.name() {
             return Err(no_model(&format!("it names the network {}", header.network)));
         }
@@ -99,11 +100,11 @@ impl CapacityNetwork {
     /// # Errors
     /// A text.
     pub fn to_bytes(&self) -> std::result::Result<Vec<u8>, String> {
-        let text = self.header.as_ref().map(serde_json::to_string).transpose();
-        let text = text.map_err(|e| e.to_string())?;
         let all = self.network.parameters().iter();
         let state: State =
             all.map(|(d, v)| (d.name.clone(), d.shape.clone(), v.to_vec())).collect();
+        let text =
+            self.header.as_ref().map(|header| weights::sealed(header, &state)).transpose()?;
         weights::to_safetensors(&state, text.map(|t| HashMap::from([(ENTRY.to_owned(), t)])))
     }
 

@@ -8,13 +8,14 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use super::safetensors::safetensors_text;
+use super::seal::Seal;
 
 /// How the names of our entries begin.
 const OURS: &str = "corsmal-feat";
 /// Longest header of a safetensors file.
 const MAX_HEADER: u64 = 100_000_000;
 
-/// The entry of this name and version from a file's bytes; `None` where there is none of the name.
+/// The entry of this name and version from a file's bytes, and its seal; `None` where there is none of the name.
 ///
 /// # Errors
 /// A text when it is no safetensors file, or the entry is of another version or form.
@@ -22,15 +23,17 @@ pub(crate) fn entry<T: DeserializeOwned>(
     bytes: &[u8],
     name: &str,
     version: u32,
-) -> Result<Option<T>, String> {
+) -> Result<Option<(T, Seal)>, String> {
     let Some(text) = safetensors_text(bytes, name)? else { return Ok(None) };
-    let value: Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
+    let mut value: Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
     let format = value.get("format").and_then(Value::as_u64);
     if format != Some(version.into()) {
         let found = format.map_or("none".into(), |f| f.to_string());
         return Err(format!("format version {found}: this program reads version {version}"));
     }
-    serde_json::from_value(value).map(Some).map_err(|e| e.to_string())
+    let seal = Seal::take(&mut value);
+    let entry = serde_json::from_value(value).map_err(|e| e.to_string())?;
+    Ok(Some((entry, seal)))
 }
 
 /// Whether a training of this program made a file: a network, a capacity network or a checkpoint. Its numbers

@@ -7,6 +7,7 @@ mod numbers;
 mod pickle;
 mod pth;
 mod safetensors;
+mod seal;
 
 use std::fs::File;
 use std::io::Read;
@@ -17,6 +18,7 @@ pub use entry::trained_here;
 pub use error::WeightsError;
 pub use numbers::{MAX_FILE, State};
 pub use safetensors::{from_safetensors, safetensors_shapes, safetensors_text, to_safetensors};
+pub(crate) use seal::{Seal, sealed};
 
 /// How weights are written.
 enum Format {

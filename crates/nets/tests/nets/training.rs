@@ -155,7 +155,20 @@ fn a_training_that_was_stopped_goes_on_to_the_same_bytes() {
     damaged[sound.len() / 4 * 2] ^= 1;
     std::fs::write(&path, &damaged).unwrap();
     let text = go(task, Some(&path), 9).unwrap_err().to_string();
-    assert!(text.contains("damaged: remove it"), "{text}");
+    assert!(text.contains("the checkpoint is damaged"), "{text}");
+    let text = String::from_utf8_lossy(&sound[..4000]);
+    let place = |key: &str| text.find(&format!("\\\"{key}\\\":")).unwrap() + 2;
+    let (steps, hash) = (place("steps"), place("hash"));
+    let change = |at: usize, word: &[u8]| {
+        let mut changed = sound.clone();
+        changed[at..at + word.len()].copy_from_slice(word);
+        std::fs::write(&path, &changed).unwrap();
+        go(task, Some(&path), 9).unwrap_err().to_string()
+    };
+    let text = change(steps + 8, b"9");
+    assert!(text.contains("the checkpoint is damaged"), "{text}");
+    let text = change(hash, b"cash");
+    assert!(text.contains("unknown field `cash`"), "{text}");
     std::fs::write(&path, &sound).unwrap();
 
     let other = Task { train: &train[..5], ..task };
@@ -257,6 +270,16 @@ fn a_model_file_gives_back_the_network() {
     for cut in [0, 7, 300, bytes.len() - 1] {
         assert!(NetModel::from_bytes(&bytes[..cut]).is_err());
     }
+    let mut damaged = bytes.clone();
+    damaged[bytes.len() - 9] ^= 1;
+    let text = NetModel::from_bytes(&damaged).unwrap_err();
+    assert!(text.contains("damaged: its content does not have the hash"), "{text}");
+    // Networks of version 0.1.0 have none.
+    let state = corsmal_nets::weights::from_safetensors(&bytes).unwrap();
+    let text = serde_json::to_string(&model.header).unwrap();
+    let texts = HashMap::from([("corsmal-feat".to_owned(), text)]);
+    let old = corsmal_nets::weights::to_safetensors(&state, Some(texts)).unwrap();
+    assert_eq!(NetModel::from_bytes(&old).unwrap().header, model.header);
     // As many outputs as labels: told before numbers are made for them.
     for (network, labels, expected) in [
         ("m3_mlp", 1 << 16, "is missing"),

@@ -163,6 +163,16 @@ impl Camera {
         [x * over * k[0][0] + y * over * k[0][1] + k[0][2], y * over * k[1][1] + k[1][2]]
     }
 
+    /// Whether another camera's numbers differ by no more than rounding to four digits.
+    pub fn is_near(&self, other: &Self) -> bool {
+        let numbers = |camera: &Self| {
+            let matrices = [camera.intrinsic, camera.rotation, [camera.translation; 3]];
+            matrices.into_iter().flatten().flatten().collect::<Vec<f64>>()
+        };
+        let near = |(a, b): (f64, f64)| (a - b).abs() <= 1e-4 * (1.0 + a.abs());
+        numbers(self).into_iter().zip(numbers(other)).all(near)
+    }
+
     /// Distance of a point along the camera's axis in m; below 0 behind the camera.
     pub(crate) fn depth(&self, point: [f64; 3]) -> f64 {
         matrix::times(&self.rotation, point)[2] + self.translation[2]

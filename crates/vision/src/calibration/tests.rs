@@ -20,6 +20,18 @@ fn json_gives_a_camera_that_projects_and_back() {
     }
 }
 
+/// Points were projected as if there were none, and triangulated with it.
+#[test]
+fn the_skew_counts_in_either_direction() {
+    let camera = parse(&CAMERA.replace("900,0,640", "900,30,640")).unwrap().rgb;
+    let [column, row] = camera.project([0.2, -0.1, 0.0]);
+    assert_eq!([column, row], [728.5, 315.0]);
+    let point = camera.back_projection().unwrap().point(column, row, 2.0);
+    assert!(point.iter().zip([0.2, -0.1, 0.0]).all(|(a, b)| (a - b).abs() < 1e-12), "{point:?}");
+    let other = parse(CAMERA).unwrap().rgb;
+    assert!(!camera.is_near(&other) && camera.is_near(&camera.clone()));
+}
+
 /// The camera with a projection of a focal length and a distance, times a factor.
 fn projected(focal: f64, away: f64, factor: f64) -> String {
     let rows = [
