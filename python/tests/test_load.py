@@ -197,6 +197,8 @@ def test_every_reader_names_a_missing_file(tmp_path: Path) -> None:
     """Those of networks and pictures spoke of parameters and models."""
     nothing, there = str(tmp_path / "nothing"), tmp_path / "there.csv"
     there.write_text("id,true,predicted\na,x,x\n")
+    near = np.zeros((720, 1280), np.uint16)
+    near[300:500, 600:720] = 500
     readers: list[Callable[[], object]] = [
         lambda: cf.vision.load_calibration(nothing),
         lambda: cf.vision.load_mask(nothing),
@@ -207,7 +209,7 @@ def test_every_reader_names_a_missing_file(tmp_path: Path) -> None:
         lambda: cf.evaluate(nothing, there),
         lambda: cf.evaluate(there, nothing),
         lambda: cf.evaluate(there, there, baseline=nothing),
-        lambda: cf.vision.m2_capacity(np.zeros((720, 1280), np.uint16), nothing),
+        lambda: cf.vision.m2_capacity(near, nothing),
         lambda: cf.score(there, labels=nothing),
         lambda: cf.load_model(nothing),
         lambda: cf.compare_predictions(there, nothing),
