@@ -52,7 +52,7 @@ def test_watched_items_may_be_an_array() -> None:
         assert history(np.array(watched)) == expected
         assert expected["epochs"][0]["score"] is not None  # type: ignore[index]
     assert history(np.array([], dtype=int)) == history(None)
-    for wrong in (12, -1):
+    for wrong in (12, -1, 12.0):
         with pytest.raises(ParameterError, match=f"indices of 12 items, not {wrong}"):
             history([wrong])
     with pytest.warns(UserWarning, match="all items of b are watched: nothing is learned of them"):

@@ -166,6 +166,12 @@ pub enum ModelError {
         /// why
         reason: String,
     },
+    /// Rows whose group is not known.
+    #[error("groups: {reason}")]
+    Groups {
+        /// why
+        reason: String,
+    },
     /// Probabilities asked of a model that has none.
     #[error("this {owner} has no probabilities: {remedy}")]
     NoProbability {

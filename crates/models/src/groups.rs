@@ -46,5 +46,5 @@ pub fn values(table: &LabelledTable, column: &str, otherwise: &str) -> Result<Ve
         values.len(),
         table.ids[first]
     );
-    Err(ModelError::Folds { reason }.into())
+    Err(ModelError::Groups { reason }.into())
 }

@@ -62,7 +62,12 @@ impl Weights {
     pub fn read(path: &Path) -> Result<Self> {
         let identity = corsmal_files::identity::of_file(path)
             .map_err(|source| SystemError::Io { path: path.into(), source })?;
-        let labels = NetModel::load(path).ok().map(|model| model.header.labels);
+        let labels = match NetModel::load(path) {
+            Ok(model) => Some(model.header.labels),
+            // Of a damaged network, nothing is taken.
+            Err(error) if weights::trained_here(path) => return Err(error.into()),
+            Err(_) => None,
+        };
         Ok(Self { path: path.into(), identity, state: weights::read(path)?, labels })
     }
 
@@ -172,7 +177,7 @@ impl Training<'_> {
         let usual = || groups::usual(table, (&labels, &classes)).filter(|_| by_group);
         let column = self.groups.or_else(usual);
         let groups = column.map(|column| match by_group {
-            true => groups::values(table, column, ""),
+            true => groups::values(table, column, "; --groups names it"),
             false => table.column(column),
         });
         let groups = groups.transpose()?;

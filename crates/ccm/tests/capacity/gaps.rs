@@ -38,7 +38,8 @@ fn the_fused_estimate_does_without_single_frames_and_says_when_it_is_the_prior()
     std::fs::write(&path, model.to_string()).unwrap();
     let row = fused(&path);
     let reason = row.estimate.as_ref().unwrap().substitute.clone().unwrap();
-    assert_eq!(row.status(), "prior");
+    assert_eq!((row.status(), row.estimate.as_ref().unwrap().frames), ("prior", 0));
+    assert!(all.estimate.unwrap().frames > 0);
     assert!(reason.starts_with("prior: no method") && reason.contains(" box "), "{reason}");
 }
 

@@ -267,4 +267,24 @@ fn the_group_that_chose_the_epoch_is_named() {
     assert!(said.contains("which was not trained on"), "{said}");
     let shown: Value = serde_json::from_str(&done(&["inspect", text(&model), "--json"])).unwrap();
     assert!(shown.to_string().contains(&format!("\"validation_group\":\"{group}\"")), "{shown}");
+
+    // Rows without one were a group of their own.
+    let labels = folder.path().join("labels.csv");
+    let row =
+        |i: usize| format!("r{i:02},{},{}\n", i % 2, if i < 3 { "" } else { ["a", "b"][i % 2] });
+    let rows: String = (0..12).map(row).collect();
+    std::fs::write(&labels, format!("id,full,container\n{rows}")).unwrap();
+    let learn = ["train", text(&features), "--net", "m5-vggish-level", "--labels", text(&labels)];
+    let learn = [&learn[..], &["--target", "full", "-o", text(&usual), "--overwrite"]].concat();
+    let message = refused(&[&learn[..], &by[2..]].concat());
+    assert!(message.contains("groups: 3 rows without container of 12"), "{message}");
+    done(&[&learn[..], &["--set", "epochs=1"]].concat());
+
+    // A damaged network gives a training nothing to begin with.
+    let mut bytes = std::fs::read(&model).unwrap();
+    let last = bytes.len() - 9;
+    bytes[last] ^= 1;
+    std::fs::write(&model, bytes).unwrap();
+    let message = refused(&[&learn[..], &["--weights", text(&model)]].concat());
+    assert!(message.contains("damaged"), "{message}");
 }

@@ -203,6 +203,13 @@ mod tests {
         assert_eq!([&model.header, &weights.header], [&trained.header; 2]);
         let of = |n: &CapacityNetwork| n.millilitres(&images[2].0, [0.3, 0.1]).unwrap();
         assert_eq!([of(&model), of(&weights)], [of(&trained); 2]);
+        let mut damaged = bytes.clone();
+        damaged[bytes.len() - 9] ^= 1;
+        std::fs::write(&file, &damaged).unwrap();
+        for read in [CapacityNetwork::read_model, CapacityNetwork::read] {
+            let text = read(&file).unwrap_err().to_string();
+            assert!(text.contains("damaged"), "{text}");
+        }
     }
 
     #[test]

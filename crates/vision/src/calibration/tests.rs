@@ -29,7 +29,12 @@ fn the_skew_counts_in_either_direction() {
     let point = camera.back_projection().unwrap().point(column, row, 2.0);
     assert!(point.iter().zip([0.2, -0.1, 0.0]).all(|(a, b)| (a - b).abs() < 1e-12), "{point:?}");
     let other = parse(CAMERA).unwrap().rgb;
-    assert!(!camera.is_near(&other) && camera.is_near(&camera.clone()));
+    assert!(!camera.is_near(&other));
+    for (off, near) in [(5e-5, true), (1e-2, false)] {
+        let mut rounded = camera.clone();
+        rounded.translation[2] += off;
+        assert_eq!(camera.is_near(&rounded), near, "{off}");
+    }
 }
 
 /// The camera with a projection of a focal length and a distance, times a factor.
