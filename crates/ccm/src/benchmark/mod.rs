@@ -158,6 +158,13 @@ pub fn run(
     let mut cautions: Vec<String> =
         options.capacities.iter().filter_map(CapacityTable::caution).collect();
     cautions.iter().for_each(|caution| progress(caution));
+    for table in &options.capacities {
+        if let Some(unmeasured) = crate::capacity::unmeasured(&table.path)? {
+            let caution = format!("{}: {unmeasured}.", table.name);
+            progress(&format!("warning: {caution}"));
+            cautions.push(caution);
+        }
+    }
     let earlier = files::prepare(&options.out)?;
     let jobs = options.jobs;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build();

@@ -11,6 +11,6 @@ pub(super) struct Predicted<'a> {
     pub(super) added: &'a [Placed],
     /// Tables of capacities, with what a method that was run here takes.
     pub(super) capacities: &'a [(Placed, Option<&'static str>)],
-    /// What makes scores of capacities too good.
+    /// What makes scores of capacities doubtful.
     pub(super) cautions: &'a [String],
 }

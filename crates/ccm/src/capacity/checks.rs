@@ -10,18 +10,22 @@ use super::views::{VIEWS, Views};
 use crate::dataset::Recording;
 use crate::error::{CcmError, Result};
 
-/// Refuses a folder with a table that several recordings would have: sequences of the same name occur in
-/// every container.
+/// Refuses a folder that is not there or has no table of any recording, and one with a table that several
+/// recordings would have: sequences of the same name occur in every container.
 pub(crate) fn require_own_tables(
     recordings: &[Recording],
     detections: Option<&Path>,
 ) -> Result<()> {
     let Some(folder) = detections else { return Ok(()) };
+    std::fs::read_dir(folder).map_err(|e| CcmError::io(folder, e))?;
+    let mut is_any = recordings.is_empty();
     let mut owners: HashMap<PathBuf, &Recording> = HashMap::new();
     for recording in recordings {
         let views = Views::of(recording, detections);
+        let table = views.table();
+        is_any |= !matches!(table, Ok(None));
         // Two tables are said of their recording.
-        let Ok(Some(table)) = views.table() else { continue };
+        let Ok(Some(table)) = table else { continue };
         if let Some(other) = owners.insert(table.clone(), recording) {
             let own = |recording| {
                 let table = Views::of(recording, detections).table_in(folder);
@@ -38,7 +42,16 @@ pub(crate) fn require_own_tables(
             )));
         }
     }
-    Ok(())
+    if is_any {
+        return Ok(());
+    }
+    let first = Views::of(&recordings[0], detections).table_in(folder);
+    Err(CcmError::Request(format!(
+        "{}: has no table of detections of any of {} recordings; expected such as {}",
+        folder.display(),
+        recordings.len(),
+        first.display()
+    )))
 }
 
 /// Recordings whose pictures come from videos with B-frames, in words: what the decoder makes of these may be wrong.

@@ -162,6 +162,21 @@ pub fn read(path: &Path) -> Result<HashMap<Named, Measured>> {
     Ok(measured)
 }
 
+/// What a table of [`write()`] has not measured, in words; `None` where all is, or where it does not say.
+///
+/// # Errors
+/// [`CcmError`] for an unreadable table.
+pub fn unmeasured(path: &Path) -> Result<Option<String>> {
+    let table = Table::read(path)?;
+    let Some(status) = table.find("status") else { return Ok(None) };
+    let rows = table.rows();
+    let count = |word: &str| (0..rows).filter(|&row| table.text(row, status) == word).count();
+    let (prior, none) = (count("prior"), count("none") + count("failed"));
+    Ok((prior + none > 0).then(|| {
+        format!("of {rows} capacities, {prior} are priors, which nobody measured, and {none} are missing")
+    }))
+}
+
 /// Writes the table of what [`run`](super::run) made by these options; the file appears only when complete.
 ///
 /// # Errors

@@ -190,11 +190,6 @@ fn capacities(args: &Args) -> Result<Option<Vec<CapacityTable>>, Failure> {
             }
             rows => rows?,
         };
-        if !rows.iter().any(|row| row.status() == "ok") {
-            eprintln!(
-                "warning: {name} measures no capacity: its rows in the tables are priors, or missing"
-            );
-        }
         let folder = args.out.join("capacity");
         std::fs::create_dir_all(&folder).map_err(|e| CcmError::io(&folder, e))?;
         let path = folder.join(format!("{}.csv", method.name()));
@@ -225,6 +220,11 @@ fn systems(args: &Args) -> Result<Vec<Box<dyn System>>, Failure> {
         }
         crate::networks::refuse_own(&format!("--weights {name}"), path)?;
         weights.push((network.to_owned(), Arc::new(Weights::read(path)?)));
+    }
+    if let (Some((name, _)), false) =
+        (args.embeddings.first(), methods.iter().any(|method| method.name == "m5"))
+    {
+        return Err(Failure::new(format!("--embeddings {name}: only m5 takes embeddings")));
     }
     let epochs = args.epochs.map(|n| n as usize);
     let embeddings = args.embeddings.clone();

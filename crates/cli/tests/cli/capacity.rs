@@ -174,6 +174,17 @@ fn benchmark_runs_what_learned(dir: &Path, m2: &Path) {
     }
     let page = std::fs::read_to_string(report.join("report.html")).unwrap();
     assert!(page.contains("The model of Fused was trained on C1, C2"), "no caution");
+    // Five of six recordings have no views: what stands there is no measurement.
+    let table = report.join("capacity/m3.csv");
+    let statuses = std::fs::read_to_string(&table).unwrap();
+    let none = statuses.matches(",none,").count();
+    let expected =
+        format!("M3: of 57 capacities, 0 are priors, which nobody measured, and {none} are");
+    assert!(none > 0 && page.contains(&expected), "{none}: {statuses}");
+    assert!(!page.contains("PCA baselines come with"), "no baseline of this run has PCA");
+    let odd = ["--methods", "m1", "--embeddings", "vggish=absent.npz"];
+    let refusal = refused(&[&common[..], &odd].concat());
+    assert!(refusal.contains("--embeddings vggish: only m5 takes embeddings"), "{refusal}");
     // What only adds a capacity is not the best at level or type.
     let glance = std::fs::read_to_string(report.join("tables/glance.csv")).unwrap();
     assert!(glance.contains("kNN") && !glance.contains("capacity"), "{glance}");
@@ -214,5 +225,28 @@ fn options_of_other_methods_are_refused() {
     ] {
         let found = refused(&[&of[..], &words].concat());
         assert!(found.contains(message), "{found}");
+    }
+}
+
+/// A folder with a typo in its name gave the prior for every recording, at exit code 0.
+#[test]
+fn a_folder_of_detections_must_have_some() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let data = data(&at("ccm"), true);
+    std::fs::create_dir(at("empty")).unwrap();
+    let (absent, empty, out) = (at("absent"), at("empty"), at("out"));
+    for command in [
+        &["capacity", "--method", "m5"][..],
+        &["crops"],
+        &["benchmark", "--baselines", "zcr-mfcc-knn"],
+    ] {
+        for (given, expected) in
+            [(&absent, "absent: "), (&empty, "has no table of detections of any")]
+        {
+            let rest = ["--data", &data, "--detections", text(given), "--out", text(&out)];
+            let message = refused(&[command, &rest].concat());
+            assert!(message.contains(expected), "{command:?}: {message}");
+        }
     }
 }

@@ -4,8 +4,8 @@ use corsmal_report::{Fact, Section, capitalised};
 
 use crate::benchmark::Made;
 use crate::benchmark::baselines::BaselineResult;
+use crate::benchmark::predicted::Predicted;
 use crate::benchmark::results::Rows;
-use crate::benchmark::system::Run;
 use crate::citation;
 use crate::dataset::DataSet;
 
@@ -57,12 +57,12 @@ pub(super) fn methods() -> Section {
     }
 }
 
-/// `nowhere`: methods whose files have no recording of the data set; `cautions`: of models that learned from what they estimate.
+/// `nowhere`: methods whose files have no recording of the data set.
 pub(super) fn notes<'a>(
     nowhere: impl Iterator<Item = &'a str>,
-    cautions: &[String],
-    runs: &[Run],
+    predicted: &Predicted<'_>,
 ) -> Section {
+    let &Predicted { outcomes, runs, cautions, .. } = predicted;
     let of_systems = runs
         .iter()
         .flat_map(|run| run.notes.iter().map(|note| format!("{} of this run: {note}", run.system)));
@@ -79,11 +79,13 @@ pub(super) fn notes<'a>(
              80.84, and the combined filling mass of M3 (53.47) is not the mean of its public and \
              private figures (51.97). Figures on this page are those of the tables."
                 .into(),
-            "The near-random scores of the paper's PCA baselines come with principal components \
-             fitted separately on each test part, which the published protocol repeats in this run."
-                .into(),
         ]
         .into_iter()
+        .chain(outcomes.iter().any(|outcome| outcome.baseline.pca).then(|| {
+            "The near-random scores of the paper's PCA baselines come with principal components \
+             fitted separately on each test part, which the published protocol repeats in this run."
+                .into()
+        }))
         .chain(absent)
         .chain(cautions.iter().cloned())
         .chain(of_systems)

@@ -29,7 +29,7 @@ pub(super) fn report(
     seed: u64,
     made: &Made,
 ) -> Result<Report> {
-    let &Predicted { outcomes, runs, added, capacities, cautions } = predicted;
+    let &Predicted { outcomes, runs, added, capacities, .. } = predicted;
     let methods = methods(rows, predicted, seed);
     let mut sections = vec![glance::section(set.synthetic, rows, &methods, seed)?];
     for task in Task::ALL {
@@ -44,7 +44,7 @@ pub(super) fn report(
     sections.push(about::methods());
     let given = added.iter().chain(capacities.iter().map(|(table, _)| table));
     let nowhere = given.filter(|a| !a.is_any()).map(|a| a.name.as_str());
-    sections.push(about::notes(nowhere, cautions, runs));
+    sections.push(about::notes(nowhere, predicted));
     sections.push(about::cite());
     Ok(Report {
         title: match (runs, capacities) {
