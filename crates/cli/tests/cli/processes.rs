@@ -110,7 +110,15 @@ fn nohup_is_heeded() {
 
     let trained = Trained::new();
     let bytes = std::fs::read(trained.at("audio/low/0.wav")).unwrap();
+    // No shell hears again what was ignored when it began, as under `nohup cargo test`, which hung.
+    let status = std::fs::read_to_string("/proc/self/status").unwrap();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:")).unwrap();
+    let is_ignored = u64::from_str_radix(ignored.trim(), 16).unwrap() & 1 == 1;
     for (before, code) in [("trap '' HUP; ", 0), ("", 130)] {
+        if code == 130 && is_ignored {
+            eprintln!("skipped: hang-ups are ignored here");
+            continue;
+        }
         let script =
             format!("{before}exec \"$0\" classify -m \"$1\" --in - --window 0.5 --hop 0.5");
         let mut child = Command::new("sh")
