@@ -19,6 +19,16 @@ fn noise(count: usize) -> (Items, Vec<usize>) {
     (Items { columns: vec![Column { values, offsets }] }, (0..count).map(|i| i % 3).collect())
 }
 
+/// Items of three classes.
+fn data<'a>(items: &'a Items, classes: &'a [usize], groups: Option<&'a [String]>) -> Data<'a> {
+    Data { items, classes, n_classes: 3, groups, weights: None, device: &Device::Cpu }
+}
+
+/// A training on all of them.
+fn all(count: usize) -> FoldItems {
+    FoldItems { name: "all".into(), train: (0..count).collect(), test: vec![] }
+}
+
 fn recipe(epochs: usize, select: Select) -> Recipe {
     let usual = networks::named("m1").unwrap().recipe;
     Recipe { epochs, batch: 8, lr: 3e-3, select, seed: 4, ..usual }
@@ -28,14 +38,7 @@ fn recipe(epochs: usize, select: Select) -> Recipe {
 fn the_lowest_loss_on_a_fifth_of_the_training_rows_chooses_the_epoch() {
     let (items, classes) = noise(36);
     let definition = networks::named("m1").unwrap();
-    let data = Data {
-        items: &items,
-        classes: &classes,
-        n_classes: 3,
-        groups: None,
-        weights: None,
-        device: &Device::Cpu,
-    };
+    let data = data(&items, &classes, None);
     let fold = FoldItems { name: "f".into(), train: (0..30).collect(), test: (30..36).collect() };
     let recipes = |epochs| recipe(epochs, Select::Split);
     let (train, held, group) = watched(data, &fold, &recipes(5)).unwrap();
@@ -73,16 +76,8 @@ fn the_lowest_loss_on_a_fifth_of_the_training_rows_chooses_the_epoch() {
 #[test]
 fn a_fifth_of_too_few_rows_is_refused() {
     let (items, classes) = noise(6);
-    let data = Data {
-        items: &items,
-        classes: &classes,
-        n_classes: 3,
-        groups: None,
-        weights: None,
-        device: &Device::Cpu,
-    };
-    let fold = FoldItems { name: "f".into(), train: (0..6).collect(), test: vec![] };
-    let error = watched(data, &fold, &recipe(1, Select::Split)).unwrap_err();
+    let data = data(&items, &classes, None);
+    let error = watched(data, &all(6), &recipe(1, Select::Split)).unwrap_err();
     assert!(matches!(&error, NetError::Targets(text) if text.contains("must have 3")), "{error}");
 }
 
@@ -91,16 +86,8 @@ fn a_fifth_of_too_few_rows_is_refused() {
 fn a_validation_group_leaves_items_of_every_class() {
     let (items, classes) = noise(12);
     let watch = |groups: &[String], seed: u32| {
-        let data = Data {
-            items: &items,
-            classes: &classes,
-            n_classes: 3,
-            groups: Some(groups),
-            weights: None,
-            device: &Device::Cpu,
-        };
-        let fold = FoldItems { name: "f".into(), train: (0..12).collect(), test: vec![] };
-        watched(data, &fold, &Recipe { seed: seed.into(), ..recipe(1, Select::Validation) })
+        let data = data(&items, &classes, Some(groups));
+        watched(data, &all(12), &Recipe { seed: seed.into(), ..recipe(1, Select::Validation) })
     };
     // All of the third class is in one group.
     let group = |i: usize| if i % 3 == 2 { "whole".into() } else { format!("g{}", i / 3) };
@@ -116,15 +103,7 @@ fn a_validation_group_leaves_items_of_every_class() {
 #[test]
 fn an_epoch_chosen_as_published_needs_a_fold() {
     let (items, classes) = noise(6);
-    let data = Data {
-        items: &items,
-        classes: &classes,
-        n_classes: 3,
-        groups: None,
-        weights: None,
-        device: &Device::Cpu,
-    };
-    let fold = FoldItems { name: "f".into(), train: (0..6).collect(), test: vec![] };
-    let error = watched(data, &fold, &recipe(1, Select::Published)).unwrap_err();
+    let data = data(&items, &classes, None);
+    let error = watched(data, &all(6), &recipe(1, Select::Published)).unwrap_err();
     assert!(error.to_string().contains("only cross-validation has"), "{error}");
 }
