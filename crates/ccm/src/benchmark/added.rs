@@ -32,6 +32,24 @@ impl Placed {
     pub(super) fn is_any(&self) -> bool {
         self.training.is_some() || self.tests.iter().any(Option::is_some)
     }
+
+    /// How many capacities are priors or missing, in words; `None` where all are estimates.
+    pub(super) fn unmeasured(&self) -> Option<String> {
+        let parts = self.training.iter().chain(self.tests.iter().flatten());
+        let all: Vec<&Estimate> = parts.flatten().collect();
+        let priors = all.iter().filter(|estimate| estimate.has_prior_capacity).count();
+        let missing = all.iter().filter(|estimate| estimate.capacity_ml.is_none()).count();
+        (priors + missing > 0).then(|| {
+            let (name, count) = (&self.name, all.len());
+            format!("{name}: of {count} capacities, priors instead of estimates: {priors}; missing: {missing}.")
+        })
+    }
+
+    /// Whether it estimates any capacity.
+    pub(super) fn has_capacities(&self) -> bool {
+        let mut parts = self.training.iter().chain(self.tests.iter().flatten());
+        parts.any(|part| part.iter().any(|estimate| estimate.capacity_ml.is_some()))
+    }
 }
 
 impl Added {
@@ -57,6 +75,7 @@ impl Added {
     pub fn capacities(name: &str, path: &Path) -> Result<Self> {
         let estimate = |measured: capacity::Measured| Estimate {
             capacity_ml: measured.capacity_ml,
+            has_prior_capacity: measured.is_prior,
             dimensions: measured.dimensions,
             execution_ms: measured.execution_ms,
             ..Estimate::default()

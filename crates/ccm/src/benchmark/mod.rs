@@ -158,9 +158,9 @@ pub fn run(
     let mut cautions: Vec<String> =
         options.capacities.iter().filter_map(CapacityTable::caution).collect();
     cautions.iter().for_each(|caution| progress(caution));
-    for table in &options.capacities {
-        if let Some(unmeasured) = crate::capacity::unmeasured(&table.path)? {
-            let caution = format!("{}: {unmeasured}.", table.name);
+    let estimating = added.iter().filter(|a| a.has_capacities());
+    for table in estimating.chain(capacities.iter().map(|(table, _)| table)) {
+        if let Some(caution) = table.unmeasured() {
             progress(&format!("warning: {caution}"));
             cautions.push(caution);
         }

@@ -94,6 +94,8 @@ pub struct Estimate {
     pub level_probabilities: Option<[f64; 3]>,
     /// Capacity in mL.
     pub capacity_ml: Option<f64>,
+    /// Whether the capacity is a prior that stands for a measurement.
+    pub has_prior_capacity: bool,
     /// Mass of the empty container in g.
     pub container_mass_g: Option<f64>,
     /// Widths and height in mm.
@@ -145,6 +147,7 @@ impl From<SubmissionRow> for Estimate {
             kind_probabilities: p.kind_probabilities,
             level_probabilities: p.level_probabilities,
             capacity_ml: p.capacity_ml,
+            has_prior_capacity: false,
             container_mass_g: p.container_mass_g,
             dimensions: p.dimensions,
             execution_ms: p.execution_ms,

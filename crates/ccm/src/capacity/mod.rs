@@ -36,7 +36,7 @@ pub use model::{CapacityModel, HeldOut};
 pub use options::{CapacityOptions, Method};
 pub use problem::Problem;
 pub use regions::{LabelledRegion, Regions, regions};
-pub use table::{Measured, PRIOR_MASS_G, Row, read, unmeasured, write};
+pub use table::{Measured, PRIOR_MASS_G, Row, read, write};
 pub use views::Views;
 
 /// Estimates every recording of a data set, in its order. `progress` hears how many are done.

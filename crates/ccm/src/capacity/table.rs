@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use corsmal_files::draft;
+use corsmal_vision::lode::PRIOR_ML;
 
 use super::methods::Estimate;
 use super::options::CapacityOptions;
@@ -109,6 +110,8 @@ pub const PRIOR_MASS_G: f64 = 15.0;
 pub struct Measured {
     /// Capacity in mL.
     pub capacity_ml: Option<f64>,
+    /// Whether it stands for a measurement: a row of status `prior`, or M5's published prior.
+    pub is_prior: bool,
     /// Widths and height in mm.
     pub dimensions: Option<Dimensions>,
     /// Time it took, in ms.
@@ -139,7 +142,7 @@ pub fn read(path: &Path) -> Result<HashMap<Named, Measured>> {
     } else {
         None
     };
-    let file = table.column("fileName")?;
+    let (file, status) = (table.column("fileName")?, table.find("status"));
     let mut measured = HashMap::with_capacity(capacities.len());
     for row in 0..table.rows() {
         let named = row_name(&table, row, file)?;
@@ -157,24 +160,12 @@ pub fn read(path: &Path) -> Result<HashMap<Named, Measured>> {
             }
             _ => None,
         };
-        measured.insert(named, Measured { capacity_ml, dimensions, execution_ms: cell(3)? });
+        let says_prior = status.is_some_and(|status| table.text(row, status) == "prior");
+        let is_prior = capacity_ml.is_some() && (says_prior || capacity_ml == Some(PRIOR_ML));
+        let execution_ms = cell(3)?;
+        measured.insert(named, Measured { capacity_ml, is_prior, dimensions, execution_ms });
     }
     Ok(measured)
-}
-
-/// What a table of [`write()`] has not measured, in words; `None` where all is, or where it does not say.
-///
-/// # Errors
-/// [`CcmError`] for an unreadable table.
-pub fn unmeasured(path: &Path) -> Result<Option<String>> {
-    let table = Table::read(path)?;
-    let Some(status) = table.find("status") else { return Ok(None) };
-    let rows = table.rows();
-    let count = |word: &str| (0..rows).filter(|&row| table.text(row, status) == word).count();
-    let (prior, none) = (count("prior"), count("none") + count("failed"));
-    Ok((prior + none > 0).then(|| {
-        format!("of {rows} capacities, {prior} are priors, which nobody measured, and {none} are missing")
-    }))
 }
 
 /// Writes the table of what [`run`](super::run) made by these options; the file appears only when complete.

@@ -211,7 +211,9 @@ fn threads_change_no_byte() {
     let written = |jobs: usize| {
         let out = dir.path().join("report");
         let options = options(&data, &out, baselines.clone());
-        run(&BenchmarkOptions { jobs, ..options }).unwrap();
+        let report = run(&BenchmarkOptions { jobs, ..options }).unwrap();
+        let notes: Vec<&String> = report.sections.iter().flat_map(|s| &s.text).collect();
+        assert!(notes.iter().any(|note| note.contains("PCA baselines come with")), "{notes:?}");
         let all = files(&out);
         std::fs::remove_dir_all(&out).unwrap();
         all

@@ -179,7 +179,7 @@ fn benchmark_runs_what_learned(dir: &Path, m2: &Path) {
     let statuses = std::fs::read_to_string(&table).unwrap();
     let none = statuses.matches(",none,").count();
     let expected =
-        format!("M3: of 57 capacities, 0 are priors, which nobody measured, and {none} are");
+        format!("M3: of 57 capacities, priors instead of estimates: 0; missing: {none}.");
     assert!(none > 0 && page.contains(&expected), "{none}: {statuses}");
     assert!(!page.contains("PCA baselines come with"), "no baseline of this run has PCA");
     let odd = ["--methods", "m1", "--embeddings", "vggish=absent.npz"];
