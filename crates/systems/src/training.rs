@@ -62,12 +62,7 @@ impl Weights {
     pub fn read(path: &Path) -> Result<Self> {
         let identity = corsmal_files::identity::of_file(path)
             .map_err(|source| SystemError::Io { path: path.into(), source })?;
-        let labels = match NetModel::load(path) {
-            Ok(model) => Some(model.header.labels),
-            // Of a damaged network, nothing is taken.
-            Err(error) if weights::trained_here(path) => return Err(error.into()),
-            Err(_) => None,
-        };
+        let labels = NetModel::load(path).ok().map(|model| model.header.labels);
         Ok(Self { path: path.into(), identity, state: weights::read(path)?, labels })
     }
 

@@ -7,7 +7,8 @@ use std::path::Path;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::safetensors::safetensors_text;
+use super::numbers::State;
+use super::safetensors::{safetensors_text, safetensors_texts};
 use super::seal::Seal;
 
 /// How the names of our entries begin.
@@ -34,6 +35,18 @@ pub(crate) fn entry<T: DeserializeOwned>(
     let seal = Seal::take(&mut value);
     let entry = serde_json::from_value(value).map_err(|e| e.to_string())?;
     Ok(Some((entry, seal)))
+}
+
+/// Refuses numbers of a file's bytes that are not those that this program wrote there.
+///
+/// # Errors
+/// A text.
+pub(super) fn check_ours(bytes: &[u8], state: &State) -> Result<(), String> {
+    for (_, text) in safetensors_texts(bytes)?.iter().filter(|(name, _)| name.starts_with(OURS)) {
+        let mut entry: Value = serde_json::from_str(text).map_err(|e| e.to_string())?;
+        Seal::take(&mut entry).check(state)?;
+    }
+    Ok(())
 }
 
 /// Whether a training of this program made a file: a network, a capacity network or a checkpoint. Its numbers

@@ -52,7 +52,12 @@ pub fn read(path: &Path) -> Result<State, WeightsError> {
     let refuse = |reason| WeightsError::Content { path: path.into(), reason };
     match Format::of(path).map_err(|source| WeightsError::Io { path: path.into(), source })? {
         Some(Format::Npz) => npz::read(path).map_err(refuse),
-        Some(Format::Safetensors) => from_safetensors(&bytes(path)?).map_err(refuse),
+        Some(Format::Safetensors) => {
+            let bytes = bytes(path)?;
+            let state = from_safetensors(&bytes).map_err(refuse)?;
+            entry::check_ours(&bytes, &state).map_err(refuse)?;
+            Ok(state)
+        }
         Some(Format::Pth) => pth::read(path).map_err(refuse),
         None => Err(refuse("not weights: expected an .npz, .safetensors or .pth file".into())),
     }

@@ -48,9 +48,14 @@ pub fn safetensors_shapes(bytes: &[u8]) -> Result<Vec<(String, Vec<usize>)>, Str
 /// # Errors
 /// A text when it is not such a file.
 pub fn safetensors_text(bytes: &[u8], entry: &str) -> Result<Option<String>, String> {
+    Ok(safetensors_texts(bytes)?.remove(entry))
+}
+
+/// All text entries of a file, from its bytes.
+pub(super) fn safetensors_texts(bytes: &[u8]) -> Result<HashMap<String, String>, String> {
     let (_, metadata) =
         SafeTensors::read_metadata(bytes).map_err(|e| format!("not a safetensors file: {e}"))?;
-    Ok(metadata.metadata().as_ref().and_then(|texts| texts.get(entry).cloned()))
+    Ok(metadata.metadata().clone().unwrap_or_default())
 }
 
 /// Weights, with text entries beside them, as a file's bytes.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::Value;
 
-use super::State;
+use super::numbers::State;
 
 /// Its key in the entry.
 const HASH: &str = "hash";
@@ -40,8 +40,7 @@ impl Seal {
     pub fn check(&self, state: &State) -> Result<(), String> {
         match &self.hash {
             Some(hash) if *hash != hash_of(&self.entry, state) => {
-                Err("damaged: its content does not have the hash that it had when it was written"
-                    .into())
+                Err("damaged: its content does not match the hash written with it".into())
             }
             _ => Ok(()),
         }

@@ -273,7 +273,7 @@ fn a_model_file_gives_back_the_network() {
     let mut damaged = bytes.clone();
     damaged[bytes.len() - 9] ^= 1;
     let text = NetModel::from_bytes(&damaged).unwrap_err();
-    assert!(text.contains("damaged: its content does not have the hash"), "{text}");
+    assert!(text.contains("damaged: its content does not match the hash"), "{text}");
     // Networks of version 0.1.0 have none.
     let state = corsmal_nets::weights::from_safetensors(&bytes).unwrap();
     let text = serde_json::to_string(&model.header).unwrap();
