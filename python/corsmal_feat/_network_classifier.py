@@ -85,7 +85,8 @@ class NetworkClassifier(ClassifierMixin, BaseEstimator):
         rows = [i for i in range(count) if i not in held]
         learned = set(positions[rows].tolist())
         if unlearned := [str(c) for i, c in enumerate(classes.tolist()) if i not in learned]:
-            warn(f"all items of {', '.join(unlearned)} are watched: nothing is learned of them")
+            names = ", ".join(unlearned)
+            warn(f"all items of {names} are watched, so the network cannot learn them")
         changes = settings(self.recipe)
         if self.random_state is not None:
             changes["seed"] = seed_of(self.random_state)

@@ -55,7 +55,7 @@ def test_watched_items_may_be_an_array() -> None:
     for wrong in (12, -1, 12.0):
         with pytest.raises(ParameterError, match=f"indices of 12 items, not {wrong}"):
             history([wrong])
-    with pytest.warns(UserWarning, match="all items of b are watched: nothing is learned of them"):
+    with pytest.warns(UserWarning, match="all items of b are watched, so the network cannot"):
         nets.NetworkClassifier("attention_gru", recipe={"epochs": 1}).fit(
             x, [*"aaaaaacccccb"], watched=[11]
         )

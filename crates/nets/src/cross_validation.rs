@@ -136,7 +136,7 @@ pub fn watched(
             if names.is_empty() {
                 return Err(NetError::Targets(format!(
                     "select = validation holds out a group of the training items, but each of the {found} \
-                     groups in training has all items of some class, which would not be learned: name other \
+                     groups in training holds all items of some class, which could then not be learned: name other \
                      groups (--groups), or use last or split"
                 )));
             }

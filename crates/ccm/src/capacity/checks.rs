@@ -47,7 +47,7 @@ pub(crate) fn require_own_tables(
     }
     let first = Views::of(&recordings[0], detections).table_in(folder);
     Err(CcmError::Request(format!(
-        "{}: has no table of detections of any of {} recordings; expected such as {}",
+        "{}: has no table of detections for any of the {} recordings in use; expected one such as {}",
         folder.display(),
         recordings.len(),
         first.display()

@@ -174,10 +174,10 @@ fn chosen_views(args: &Args) -> std::collections::BTreeSet<u8> {
 fn made_by(args: &Args, tables: &[PathBuf]) -> Result<(), Failure> {
     use corsmal_files::{draft, identity};
 
-    let mut others = tables.iter().map(|table| table.with_extension("csv"));
-    if let Some(other) = others.find(|other| other.is_file()) {
+    let mut beside = tables.iter().map(|table| table.with_extension("csv"));
+    if let Some(other) = beside.find(|other| other.is_file()) {
         return Err(Failure::new(format!(
-            "{}: is another table of a recording: remove it, or name another --out",
+            "{}: already a table of the same recording; remove it, or name another --out",
             other.display()
         )));
     }

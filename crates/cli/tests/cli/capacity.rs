@@ -242,7 +242,7 @@ fn a_folder_of_detections_must_have_some() {
         &["benchmark", "--baselines", "zcr-mfcc-knn"],
     ] {
         for (given, expected) in
-            [(&absent, "absent: "), (&empty, "has no table of detections of any")]
+            [(&absent, "absent: "), (&empty, "has no table of detections for any")]
         {
             let rest = ["--data", &data, "--detections", text(given), "--out", text(&out)];
             let message = refused(&[command, &rest].concat());

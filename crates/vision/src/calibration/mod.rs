@@ -163,7 +163,7 @@ impl Camera {
         [x * over * k[0][0] + y * over * k[0][1] + k[0][2], y * over * k[1][1] + k[1][2]]
     }
 
-    /// Whether another camera's numbers differ by no more than rounding to four decimals.
+    /// Whether another camera's numbers are equal to about 1e-4, relative for numbers above 1.
     pub fn is_near(&self, other: &Self) -> bool {
         let numbers = |camera: &Self| {
             let matrices = [camera.intrinsic, camera.rotation, [camera.translation; 3]];
