@@ -183,6 +183,14 @@ impl DatasetArgs {
         if let Some(left_out) = left_out(&table.outcomes) {
             eprintln!("warning: {}: {left_out}", self.path().display());
         }
+        let formats = table.trained_on();
+        if let Some(mixed) = formats.as_ref().and_then(|t| t.mixed_rates(&table.config)) {
+            eprintln!(
+                "warning: {}: {mixed}; extract with --set signal.sample_rate={} to resample them",
+                self.path().display(),
+                usual_rate(&table)
+            );
+        }
         if let Some(&first) = constant.first() {
             eprintln!(
                 "warning: {}: {} of {} features have the same value in all rows, the first is {}",
@@ -263,4 +271,18 @@ impl DatasetArgs {
             "labels": self.labels.file().map(file).transpose()?,
         }))
     }
+}
+
+/// The sample rate of most recordings in Hz, 0 where none is known.
+fn usual_rate(table: &LabelledTable) -> u32 {
+    let mut counts: Vec<(u32, usize)> = Vec::new();
+    for rate in table.outcomes.iter().filter_map(|outcome| outcome.sample_rate) {
+        match counts.iter_mut().find(|(known, _)| *known == rate) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((rate, 1)),
+        }
+    }
+    // The first of those that are equally many, as `extract` has it.
+    counts.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    counts.first().map_or(0, |(rate, _)| *rate)
 }

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use corsmal_models::cross_validation::{Data, choose};
-use corsmal_models::dataset::LabelledTable;
 use corsmal_models::folds::Folds;
 use corsmal_models::labels::{Labels, alike, measured};
 use corsmal_models::model_file::{Model, ModelHeader};
@@ -117,13 +116,6 @@ fn train(args: &Args) -> Result<ExitCode, Failure> {
         "choice": choice,
     });
     let trained_on = table.trained_on();
-    if let Some(mixed) = trained_on.as_ref().and_then(|t| t.mixed_rates(&table.config)) {
-        eprintln!(
-            "warning: {}: {mixed}; extract with --set signal.sample_rate={} to resample them",
-            table.path.display(),
-            usual_rate(&table)
-        );
-    }
     let header = ModelHeader {
         pipeline: spec.clone(),
         labels: labels.clone(),
@@ -210,18 +202,4 @@ fn train_network(_: &Args, _: &str) -> Result<ExitCode, Failure> {
 fn counts(labels: &Labels, y: &[usize]) -> Vec<(String, usize)> {
     let rows = |class: usize| y.iter().filter(|&&c| c == class).count();
     labels.names().iter().enumerate().map(|(class, name)| (name.clone(), rows(class))).collect()
-}
-
-/// The sample rate of most recordings in Hz, 0 where none is known.
-fn usual_rate(table: &LabelledTable) -> u32 {
-    let mut counts: Vec<(u32, usize)> = Vec::new();
-    for rate in table.outcomes.iter().filter_map(|outcome| outcome.sample_rate) {
-        match counts.iter_mut().find(|(known, _)| *known == rate) {
-            Some((_, count)) => *count += 1,
-            None => counts.push((rate, 1)),
-        }
-    }
-    // The first of those that are equally many, as `extract` has it.
-    counts.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-    counts.first().map_or(0, |(rate, _)| *rate)
 }

@@ -182,4 +182,15 @@ fn recordings_of_several_rates_are_said_to_differ() {
         let expected = "have sample rates of 22050, 44100 Hz, so their features differ; resample";
         assert_eq!(message.contains(expected), differ, "{net}: {message}");
     }
+    // So are their statistics, wherever something is learned of them.
+    let table = folder.path().join("t.npz");
+    done(&["extract", text(&audio), "--preset", "mfcc-zcr", "-q", "-o", text(&table)]);
+    let out = ["-o", text(&model), "--overwrite"];
+    for command in [[&["train"][..], &out].concat(), vec!["cross-validate", "--cv", "2"]] {
+        let output = run(&[&command[..], &[text(&table), "--labels", "folders"]].concat());
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{message}");
+        let expected = "features differ; extract with --set signal.sample_rate=44100 to resample";
+        assert!(message.contains(expected), "{command:?}: {message}");
+    }
 }
