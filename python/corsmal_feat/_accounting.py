@@ -56,7 +56,7 @@ def account(folder: Path, parts: list[str], ids: list[str], done_before: int) ->
     for name in parts:
         path = folder / PARTS / name
         try:
-            found = read(path, columns=["id", "status"])
+            found = read(path, columns=["id", "status"], page_checksum_verification=True)
         except (OSError, arrow().ArrowInvalid) as error:
             raise RunError(f"{path} cannot be read: {error}; remove it and run again") from error
         there = found["id"].to_pylist()

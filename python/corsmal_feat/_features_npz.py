@@ -13,6 +13,8 @@ from .errors import ParameterError
 
 _TIMES = "__times__/"
 _LABELS = "__labels__/"
+#: Members of every output.
+_NEEDED = ("__meta__", "__config__", "__ids__", "__outcomes__")
 
 
 def of_npz(name: str) -> dict[str, Any]:
@@ -35,11 +37,12 @@ def of_npz(name: str) -> dict[str, Any]:
 
 def _fields(archive: Any, name: str) -> dict[str, Any]:
     members: list[str] = archive.files
-    if "__meta__" not in members:
+    absent = next((k for k in _NEEDED if k not in members), None)
+    if absent is not None:
         objects = [member for member in members if _holds_objects(archive, member)]
         why = f"{objects[0]} holds Python objects, which are never read" if objects else ""
         raise ParameterError(
-            f"{name} is not an output of corsmal-feat: {why or 'it has no __meta__'}"
+            f"{name} is not an output of corsmal-feat: {why or f'it has no {absent}'}"
         )
     frames = [member for member in members if _is_frames(member)]
     run = {k: read_member(archive, name, k) for k in members if not _is_frames(k)}

@@ -13,7 +13,7 @@ from urllib.parse import quote
 import numpy as np
 import numpy.typing as npt
 
-from ._core import is_statistic
+from ._core import check_parquet, is_statistic
 from ._warnings import warn
 from .errors import ParameterError
 
@@ -137,6 +137,7 @@ def _read(name: str) -> tuple[dict[str, Any], Any]:
             f"{name}: reading Parquet needs pyarrow (pip install pyarrow); "
             "pandas.read_parquet and polars.read_parquet read the table, too"
         ) from error
+    check_parquet(name)
     try:
         # Of one file: its folder, `label=value`, says nothing here.
         table = parquet.ParquetFile(name).read()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import zipfile
+import zlib
 from collections.abc import Iterator, MutableMapping
 from typing import Any
 
@@ -13,6 +14,15 @@ import numpy.typing as npt
 from .errors import ParameterError
 
 Values = npt.NDArray[Any]
+#: What numpy and zipfile say of members that they cannot read.
+_DAMAGED = (
+    ValueError,
+    EOFError,
+    MemoryError,
+    NotImplementedError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 #: The member of a recording, or of each of its features.
 Names = str | dict[str, str]
 
@@ -29,7 +39,7 @@ def read_member(archive: Any, name: str, member: str) -> Values:
     try:
         with archive.zip.open(f"{member}.npy") as file:
             values: Values = np.lib.format.read_array(file, allow_pickle=False)
-    except (ValueError, EOFError, zipfile.BadZipFile, MemoryError) as error:
+    except _DAMAGED as error:
         what = "holds Python objects" if "pickle" in str(error) else f"cannot be read: {error}"
         raise ParameterError(f"{name}: member {member} {what}") from error
     return values

@@ -32,7 +32,9 @@ def compute_part(table: Any, folder: str, name: str, options: dict[str, Any]) ->
             log.unlink()
             raise
     sink = pyarrow().BufferOutputStream()
-    import_module("pyarrow.parquet").write_table(whole, sink, compression="zstd")
+    import_module("pyarrow.parquet").write_table(
+        whole, sink, compression="zstd", write_page_checksum=True
+    )
     write_whole(Path(folder, PARTS, name), sink.getvalue())
     log.unlink(missing_ok=True)
 

@@ -66,7 +66,9 @@ def manifest(paths: StrPath | Iterable[StrPath], *, longest: float | None = None
     names = [os.fspath(p) for p in ([paths] if isinstance(paths, str | os.PathLike) else paths)]
     if len(names) == 1 and names[0].lower().endswith(".parquet"):
         try:
-            table = import_module("pyarrow.parquet").read_table(names[0])
+            table = import_module("pyarrow.parquet").read_table(
+                names[0], page_checksum_verification=True
+            )
         except (OSError, pa.ArrowInvalid) as error:
             raise RunError(f"{names[0]}: {error}") from error
         return table if longest is None else cut(table, longest)

@@ -38,6 +38,7 @@
 //! # }
 //! ```
 
+pub mod content;
 pub mod csv_text;
 pub mod draft;
 pub mod feature_file;

@@ -14,6 +14,7 @@ use corsmal_extract::projection::Projection;
 use corsmal_extract::run::{self, Progress, RunOptions};
 use corsmal_files::npz::Compression;
 use corsmal_files::outcome::Outcome;
+use corsmal_files::parquet::ParquetFile;
 use corsmal_files::shard::Shard;
 use ndarray::{Array1, Array3};
 use numpy::PyReadonlyArrayDyn;
@@ -178,6 +179,12 @@ pub(crate) fn fetch(py: Python<'_>, name: &str, to: PathBuf) -> PyResult<()> {
         })
     };
     py.detach(|| interruptible(work, &mut |_| Ok(())))
+}
+
+/// Refuses a Parquet file of ours that does not match the hashes in it, and one that cannot be opened.
+#[pyfunction]
+pub(crate) fn check_parquet(py: Python<'_>, path: PathBuf) -> PyResult<()> {
+    compute(py, || ParquetFile::open(&path)?.check())?.map_err(value_error)
 }
 
 /// Fits principal components to the summary of a feature file and writes them to `out`.

@@ -49,7 +49,9 @@ mod _core {
     #[pymodule_export]
     use crate::evaluate::evaluate;
     #[pymodule_export]
-    use crate::extract::{PySignal, PySignals, effective_config, extract, fetch, fit_projection};
+    use crate::extract::{
+        PySignal, PySignals, check_parquet, effective_config, extract, fetch, fit_projection,
+    };
     #[pymodule_export]
     use crate::frontends::{
         m1_stft, m2_mfcc, m3_spectrogram, m4_logmel, m4_windows, m5_a34f136, m5_vggish_patches,

@@ -32,8 +32,9 @@ const ZSTD_EXPANSION: u64 = 1 << 15;
 /// Bytes read at once to find the end of a page's header.
 const HEADER: u64 = 1 << 12;
 
-/// Checks the metadata at the end of a file: that they end where they say.
-pub(super) fn check_footer(path: &Path, file: &File) -> Result<(), ParquetTableError> {
+/// Checks the metadata at the end of a file: that they end where they say. Returns where they begin, and
+/// their bytes.
+pub(super) fn check_footer(path: &Path, file: &File) -> Result<(u64, Vec<u8>), ParquetTableError> {
     let io = |e| failed(path, e);
     let length = file.metadata().map_err(io)?.len();
     let mut tail = [0; 8];
@@ -46,10 +47,14 @@ pub(super) fn check_footer(path: &Path, file: &File) -> Result<(), ParquetTableE
         return Err(layout(path, "metadata of a Parquet file at its end", "other bytes"));
     }
     let mut metadata = vec![0; size as usize];
-    read_at(file, length - 8 - size, &mut metadata).map_err(io)?;
-    thrift::structure(&metadata, FOOTER)
-        .map(drop)
-        .map_err(|_| layout(path, "metadata of a Parquet file", "bytes that contradict themselves"))
+    let start = length - 8 - size;
+    read_at(file, start, &mut metadata).map_err(io)?;
+    match thrift::structure(&metadata, FOOTER) {
+        Ok(_) => Ok((start, metadata)),
+        Err(_) => {
+            Err(layout(path, "metadata of a Parquet file", "bytes that contradict themselves"))
+        }
+    }
 }
 
 /// Values that the file of `length` bytes may hold.

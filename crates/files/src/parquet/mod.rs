@@ -10,6 +10,7 @@ mod levels;
 mod limits;
 mod numeric;
 mod reader;
+mod seal;
 mod thrift;
 mod writer;
 

@@ -1,6 +1,5 @@
 //! The columns of numbers and text of any Parquet table, ours or another tool's.
 
-use std::fs::File;
 use std::path::Path;
 
 use half::f16;
@@ -15,6 +14,7 @@ use parquet::schema::types::ColumnDescriptor;
 use super::error::{ParquetTableError, layer, layout};
 use super::keys::ROWS;
 use super::limits::{require_rows, spend};
+use super::seal::SealedFile;
 use crate::table::ID;
 
 /// The numbers of a table, and its texts.
@@ -45,7 +45,7 @@ enum Column {
 /// Reads the numeric columns of a table.
 pub(super) fn read(
     path: &Path,
-    reader: &SerializedFileReader<File>,
+    reader: &SerializedFileReader<SealedFile>,
     rows: usize,
     mut text: u64,
 ) -> Result<NumericTable, ParquetTableError> {

@@ -14,6 +14,7 @@ use super::frames::Cursors;
 use super::keys::{CONFIG, META, OUTCOMES, ROWS, WRITER};
 use super::limits::{self, require_rows, shielded, spend};
 use super::numeric::{self, NumericTable};
+use super::seal::SealedFile;
 use crate::layout::parse_outcomes;
 use crate::provenance::{LAYOUT_VERSION, Provenance};
 use crate::table::{ID, Table};
@@ -23,7 +24,8 @@ pub struct ParquetFile {
     path: PathBuf,
     file: File,
     length: u64,
-    pub(super) reader: SerializedFileReader<File>,
+    pub(super) reader: SerializedFileReader<SealedFile>,
+    sealed: SealedFile,
     /// Where reading of frames has come to.
     pub(super) cursors: Cursors,
 }
@@ -44,10 +46,13 @@ impl ParquetFile {
         shielded(path, || {
             let file = File::open(path).map_err(|e| io(path, e))?;
             let length = file.metadata().map_err(|e| io(path, e))?.len();
-            limits::check_footer(path, &file)?;
-            let other = file.try_clone().map_err(|e| io(path, e))?;
-            let reader = SerializedFileReader::new(other).map_err(|e| layer(path, e))?;
-            Ok(Self { path: path.into(), file, length, reader, cursors: Cursors::default() })
+            let (start, footer) = limits::check_footer(path, &file)?;
+            let sealed = file.try_clone().and_then(SealedFile::new).map_err(|e| io(path, e))?;
+            let reader = SerializedFileReader::new(sealed.clone()).map_err(|e| layer(path, e))?;
+            let metadata = reader.metadata().file_metadata();
+            sealed.check((start, &footer), metadata).map_err(|e| layer(path, e))?;
+            let cursors = Cursors::default();
+            Ok(Self { path: path.into(), file, length, reader, sealed, cursors })
         })
     }
 
@@ -60,6 +65,15 @@ impl ParquetFile {
     pub fn is_ours(&self) -> bool {
         let writer = self.reader.metadata().file_metadata().created_by();
         writer.is_some_and(|name| name.starts_with(WRITER)) && self.find(META).is_some()
+    }
+
+    /// Checks the whole file against the hashes in it, for those who read it by other means. Files of
+    /// other tools have none.
+    ///
+    /// # Errors
+    /// [`ParquetTableError::Parquet`] when it is damaged.
+    pub fn check(&self) -> Result<(), ParquetTableError> {
+        self.sealed.check_all().map_err(|e| layer(&self.path, e))
     }
 
     /// How an output of ours was made.

@@ -1,7 +1,7 @@
 //! Writes a table.
 
 use std::fs::File;
-use std::io::{BufWriter, Seek};
+use std::io::Seek;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
@@ -17,12 +17,13 @@ use parquet::schema::types::{ColumnPath, Type, TypePtr};
 use super::error::{ParquetTableError, io, layer};
 use super::keys::{CONFIG, META, OUTCOMES, ROWS, WRITER};
 use super::levels::Levels;
+use super::seal::{self, SealingWriter};
 use crate::layout::json_lines;
 use crate::provenance::Provenance;
 use crate::table::{ID, Table};
 
 /// A row group that is being written.
-pub(super) type Group<'a> = SerializedRowGroupWriter<'a, BufWriter<File>>;
+pub(super) type Group<'a> = SerializedRowGroupWriter<'a, SealingWriter>;
 
 /// Writes a table and waits until it is on the disk. Equal tables give equal bytes.
 ///
@@ -50,14 +51,14 @@ pub fn write_over(
 
 fn write_to(file: File, table: &Table, provenance: &Provenance) -> Result<(), ParquetError> {
     let properties = properties(table, provenance, Compression::SNAPPY);
-    let out = BufWriter::with_capacity(1 << 20, file);
     let fields = table.feature_names().iter().map(|name| {
         Type::primitive_type_builder(name, Physical::FLOAT)
             .with_repetition(Repetition::REQUIRED)
             .build()
     });
     let schema = schema(table, fields)?;
-    let mut writer = SerializedFileWriter::new(out, schema, Arc::new(properties.build()))?;
+    let mut writer =
+        SerializedFileWriter::new(SealingWriter::new(file), schema, Arc::new(properties.build()))?;
     let rows = table.ids().len();
     for start in (0..rows).step_by(ROWS) {
         let range = start..rows.min(start + ROWS);
@@ -69,7 +70,7 @@ fn write_to(file: File, table: &Table, provenance: &Provenance) -> Result<(), Pa
         }
         group.close()?;
     }
-    writer.close().map(drop)
+    seal::finish(writer)
 }
 
 /// What every output of ours says of itself, and how its texts are stored.

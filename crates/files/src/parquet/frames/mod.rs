@@ -4,7 +4,7 @@
 mod read;
 
 use std::fs::File;
-use std::io::{BufWriter, Seek};
+use std::io::Seek;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -19,6 +19,7 @@ use parquet::schema::types::{ColumnPath, Type};
 
 use super::error::{ParquetTableError, io, layer, layout};
 use super::levels::Levels;
+use super::seal::{self, SealingWriter};
 use super::writer::{properties, schema, write_column, write_texts};
 use crate::layout::TIMES;
 use crate::provenance::Provenance;
@@ -53,7 +54,7 @@ impl Default for Frames {
 
 /// Writes the frames of the rows of a table, in their order. Equal frames give equal bytes.
 pub struct FramesWriter<'a> {
-    writer: SerializedFileWriter<BufWriter<File>>,
+    writer: SerializedFileWriter<SealingWriter>,
     disk: File,
     path: PathBuf,
     table: &'a Table,
@@ -132,7 +133,7 @@ impl<'a> FramesWriter<'a> {
         if self.written != rows {
             return Err(layout(&self.path, format!("{rows} rows"), self.written));
         }
-        self.writer.close().map_err(|e| layer(&self.path, e))?;
+        seal::finish(self.writer).map_err(|e| layer(&self.path, e))?;
         self.disk.sync_all().map_err(|e| io(&self.path, e))
     }
 
@@ -170,7 +171,7 @@ fn begin(
     table: &Table,
     provenance: &Provenance,
     features: &[String],
-) -> Result<SerializedFileWriter<BufWriter<File>>, ParquetError> {
+) -> Result<SerializedFileWriter<SealingWriter>, ParquetError> {
     let mut properties = properties(table, provenance, Compression::ZSTD(ZstdLevel::try_new(1)?));
     let mut fields = Vec::with_capacity(2 * features.len());
     for feature in features {
@@ -184,9 +185,8 @@ fn begin(
                 properties.set_column_encoding(path_of(name, depth), Encoding::BYTE_STREAM_SPLIT);
         }
     }
-    let out = BufWriter::with_capacity(1 << 20, file);
     let schema = schema(table, fields.into_iter())?;
-    SerializedFileWriter::new(out, schema, Arc::new(properties.build()))
+    SerializedFileWriter::new(SealingWriter::new(file), schema, Arc::new(properties.build()))
 }
 
 /// Lists in lists, `depth` of them, without nulls.
@@ -228,6 +228,7 @@ mod tests {
     use super::*;
     use crate::outcome::{Outcome, Status};
     use crate::parquet::ParquetFile;
+    use crate::parquet::keys::{BLOCKS, HASH};
     use crate::shard::Shard;
 
     fn frames(shape: [usize; 3], seed: usize) -> Frames {
@@ -326,7 +327,9 @@ mod tests {
         let path = folder.path().join("a.parquet");
         let (table, rows) = recordings(4);
         write(&path, &table, &rows).unwrap();
-        let bytes = std::fs::read(&path).unwrap();
+        let mut bytes = std::fs::read(&path).unwrap();
+        // What the hashes would notice before the readers see it.
+        seal::without(&[BLOCKS, HASH], &mut bytes);
         for at in (0..bytes.len()).step_by(11) {
             let mut damaged = bytes.clone();
             damaged[at] = [0, 1, 0x7f, 0xff][at % 4];
