@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use corsmal_files::csv_text;
+use corsmal_files::{content, csv_text};
 
 use crate::error::{CcmError, Result};
 
@@ -19,14 +19,7 @@ pub(crate) struct Table {
 impl Table {
     /// Reads a file.
     pub(crate) fn read(path: &Path) -> Result<Self> {
-        let size = std::fs::metadata(path).map_err(|e| CcmError::io(path, e))?.len();
-        if size > MAX_BYTES {
-            return Err(CcmError::Table {
-                path: path.to_path_buf(),
-                reason: format!("{size} bytes; tables of at most {MAX_BYTES} bytes are read"),
-            });
-        }
-        let bytes = std::fs::read(path).map_err(|e| CcmError::io(path, e))?;
+        let bytes = content::read(path, MAX_BYTES).map_err(|e| CcmError::io(path, e))?;
         Self::parse(&bytes, path)
     }
 

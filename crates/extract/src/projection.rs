@@ -5,6 +5,7 @@
 //! `components [k, n]`, `mean [n]`, `explained_variance [k]`, `feature_names [n]` and `meta` (JSON).
 //! It knows the configuration of its features and refuses any other.
 
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -241,8 +242,13 @@ impl ProjectionConfig {
             return Err(ConfigError::key("projection", message));
         }
         let path = Path::new(&keys.file);
-        let bytes = std::fs::read(path).map_err(|e| refuse(format!("{}: {e}", keys.file)))?;
-        let content = blake3::hash(&bytes).to_hex().to_string();
+        let io = |e| refuse(format!("{}: {e}", keys.file));
+        if !std::fs::metadata(path).map_err(io)?.is_file() {
+            return Err(refuse(format!("{} is not a file", keys.file)));
+        }
+        let mut content = blake3::Hasher::new();
+        File::open(path).and_then(|file| content.update_reader(file).map(drop)).map_err(io)?;
+        let content = content.finalize().to_hex().to_string();
         if !keys.hash.is_empty() && keys.hash != content {
             let message = format!(
                 "{} has changed: its hash is {content}, the configuration has {}",

@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Reads a file, pipe or device of at most `most` bytes. Whatever its size is said to be, no more are
-/// read: devices have none, and files grow.
+/// Reads a file, pipe or device of at most `most` bytes, regardless of the size that the system
+/// reports: devices have none, and files grow.
 ///
 /// # Errors
 /// [`io::ErrorKind::FileTooLarge`], and whatever opening and reading report.

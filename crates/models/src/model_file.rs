@@ -221,6 +221,18 @@ impl Model {
         self.pipeline.predict_proba(x)
     }
 
+    /// Refuses a model without probabilities.
+    ///
+    /// # Errors
+    /// [`ModelError::NoProbability`].
+    pub fn require_probabilities(&self) -> Result<()> {
+        let row = Array2::zeros((1, self.n_features()));
+        match self.predict_proba(row.view()) {
+            Err(none @ ModelError::NoProbability { .. }) => Err(none),
+            _ => Ok(()),
+        }
+    }
+
     /// The fitted steps and classifier.
     pub fn pipeline(&self) -> &Pipeline {
         &self.pipeline
@@ -349,8 +361,12 @@ impl Model {
         let io = |source| ModelFileError::Io { path: path.into(), source };
         let file = File::open(path).map_err(io)?;
         limit("file", file.metadata().map_err(io)?.len(), MAX_FILE)?;
-        let mut bytes = Vec::new();
-        file.take(MAX_FILE + 1).read_to_end(&mut bytes).map_err(io)?;
+        let (mut bytes, mut file) = (Vec::new(), file.take(MAX_FILE + 1));
+        Read::by_ref(&mut file).take(MAGIC.len() as u64).read_to_end(&mut bytes).map_err(io)?;
+        // Devices that are no model have no end.
+        if bytes == MAGIC {
+            file.read_to_end(&mut bytes).map_err(io)?;
+        }
         Self::from_bytes(&bytes)
     }
 }

@@ -1,12 +1,10 @@
 //! Pictures in folders, as networks take them.
 
-use std::fs::File;
-use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use corsmal_files::identity;
+use corsmal_files::{content, identity};
 use corsmal_nets::networks::Definition;
 use corsmal_nets::picture;
 use corsmal_vision::Rgb;
@@ -128,8 +126,8 @@ impl Pictures {
             if stop.load(Ordering::SeqCst) {
                 return Err(SystemError::Interrupted);
             }
-            let (item, identity) = match bytes(path) {
-                Err(reason) => (Err(reason), String::new()),
+            let (item, identity) = match content::read(path, Rgb::MAX_BYTES) {
+                Err(e) => (Err(e.to_string()), String::new()),
                 Ok(bytes) => {
                     let image = Rgb::from_bytes(&bytes, path).map_err(|e| e.reason());
                     let item = image.map(|image| picture::item(&image.resized(width, height).data));
@@ -140,14 +138,6 @@ impl Pictures {
         };
         self.named[part].par_iter().map(read).collect()
     }
-}
-
-/// The content of a file, up to what is refused.
-fn bytes(path: &Path) -> std::result::Result<Vec<u8>, String> {
-    let mut bytes = Vec::new();
-    let read = File::open(path).and_then(|f| f.take(Rgb::MAX_BYTES + 1).read_to_end(&mut bytes));
-    read.map_err(|e| e.to_string())?;
-    Ok(bytes)
 }
 
 fn list(folder: &Path, depth: usize, paths: &mut Vec<PathBuf>) -> Result<()> {

@@ -83,14 +83,5 @@ impl VisionError {
 
 /// Reads a whole file of at most `limit` bytes.
 pub(crate) fn read(path: &Path, limit: u64) -> Result<Vec<u8>> {
-    use std::io::Read;
-    let file = std::fs::File::open(path).map_err(|e| VisionError::io(path, e))?;
-    let mut bytes = Vec::new();
-    let length =
-        file.take(limit + 1).read_to_end(&mut bytes).map_err(|e| VisionError::io(path, e))?;
-    if length as u64 > limit {
-        let actual = std::fs::metadata(path).map_or(length as u64, |m| m.len());
-        return Err(VisionError::Limit { path: path.into(), what: "size in bytes", actual, limit });
-    }
-    Ok(bytes)
+    corsmal_files::content::read(path, limit).map_err(|e| VisionError::io(path, e))
 }

@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use corsmal_files::draft;
+use corsmal_files::{content, draft};
 use corsmal_vision::category::{Category, Vote};
 use corsmal_vision::fused::{Example, Fusion};
 use corsmal_vision::{GaussianProcess, Normal};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::methods::{Estimate, region_sizes};
 use super::problem::Problem;
@@ -21,6 +22,8 @@ const MAX_BYTES: u64 = 8 << 20;
 const SIZES: usize = 8;
 /// Name of the file format.
 const KIND: &str = "corsmal-feat capacity model";
+/// The key under which a file has the hash of the rest.
+const HASH: &str = "hash";
 
 /// M3: a Gaussian process for each category.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -40,11 +43,16 @@ pub struct CapacityModel {
     /// Version of the program that wrote it.
     pub tool_version: String,
     /// What it was learned from: folder, recordings, containers, seed.
-    pub provenance: serde_json::Value,
+    pub provenance: Value,
     /// M3's processes.
     pub m3: M3,
     /// Reliability of the methods; `None` where only M3 was learned.
     pub fusion: Option<Fusion>,
+}
+
+/// Of what a file says, however it is spaced.
+fn hash_of(model: &Value) -> String {
+    blake3::hash(model.to_string().as_bytes()).to_hex().to_string()
 }
 
 /// A recording to learn from.
@@ -209,11 +217,7 @@ pub(super) fn held_out(samples: &[Sample]) -> HeldOut {
 
 impl CapacityModel {
     /// Learns M3 and, where wanted, the reliability of all methods.
-    pub(super) fn fit(
-        samples: &[Sample],
-        fused: bool,
-        provenance: serde_json::Value,
-    ) -> Result<Self> {
+    pub(super) fn fit(samples: &[Sample], fused: bool, provenance: Value) -> Result<Self> {
         let all: Vec<&Sample> = samples.iter().collect();
         Ok(Self {
             kind: KIND.into(),
@@ -230,20 +234,23 @@ impl CapacityModel {
     /// # Errors
     /// [`CcmError`] for files that cannot be read, are none of these models or of another version.
     pub fn read(path: &Path) -> Result<Self> {
-        let size = std::fs::metadata(path).map_err(|e| CcmError::io(path, e))?.len();
-        if size > MAX_BYTES {
-            return Err(CcmError::Request(format!(
-                "{}: {size} bytes; models of at most {MAX_BYTES} bytes are read",
-                path.display()
-            )));
-        }
-        let bytes = std::fs::read(path).map_err(|e| CcmError::io(path, e))?;
-        let model: Self = serde_json::from_slice(&bytes).map_err(|e| {
+        let bytes = content::read(path, MAX_BYTES).map_err(|e| CcmError::io(path, e))?;
+        let refuse = |e: serde_json::Error| {
             CcmError::Request(format!(
                 "{}: not a model of `capacity train --method m3` or `fused`: {e}",
                 path.display()
             ))
-        })?;
+        };
+        let mut value: Value = serde_json::from_slice(&bytes).map_err(refuse)?;
+        // Files of earlier versions have no hash.
+        let hash = value.as_object_mut().and_then(|entries| entries.shift_remove(HASH));
+        if value["kind"] == KIND && hash.is_some_and(|hash| hash != *hash_of(&value)) {
+            return Err(CcmError::Request(format!(
+                "{}: damaged: its content does not match the hash written with it",
+                path.display()
+            )));
+        }
+        let model: Self = serde_json::from_value(value).map_err(refuse)?;
         if (model.kind.as_str(), model.format) != (KIND, FORMAT) {
             return Err(CcmError::Request(format!(
                 "{}: '{}' of format {}; this program reads '{KIND}' of format {FORMAT}",
@@ -266,8 +273,9 @@ impl CapacityModel {
     /// # Errors
     /// [`CcmError`] when it cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let text = serde_json::to_vec(self)
+        let mut value = serde_json::to_value(self)
             .map_err(|e| CcmError::Request(format!("{}: {e}", path.display())))?;
-        draft::write(path, &text).map_err(CcmError::Write)
+        value[HASH] = hash_of(&value).into();
+        draft::write(path, value.to_string().as_bytes()).map_err(CcmError::Write)
     }
 }

@@ -40,3 +40,23 @@ fn devices_take_tables() {
     assert!(found.contains("/dev/null: is a device"), "{found}");
     assert_eq!(names(folder.path()), ["a.wav", "m", "p.csv", "x.npz"]);
 }
+
+/// A device that has no end was read until memory had one.
+#[test]
+fn endless_devices_are_read_up_to_a_limit() {
+    let folder = tempfile::tempdir().unwrap();
+    let (wav, out) = (folder.path().join("a.wav"), folder.path().join("x.npz"));
+    std::fs::write(&wav, "RIFF").unwrap();
+    let (wav, out, zero) = (text(&wav), text(&out), "/dev/zero");
+    let of_limit = "it does not end within the";
+    let data = text(folder.path());
+    for (words, part) in [
+        (&["extract", wav, "-o", out, "--config", zero][..], of_limit),
+        (&["evaluate", "--annotations", zero, zero], of_limit),
+        (&["capacity", "--method", "m3", "--model", zero, "--data", data, "-o", out], of_limit),
+        (&["classify", "--model", zero, wav, "-o", out], "not a model file"),
+    ] {
+        let found = refused(words);
+        assert!(found.contains(zero) && found.contains(part), "{words:?}: {found}");
+    }
+}

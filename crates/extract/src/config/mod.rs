@@ -17,6 +17,7 @@ pub use signal::{Channels, Normalize, SignalConfig};
 
 use std::path::Path;
 
+use corsmal_files::content;
 use serde::Deserialize;
 use serde_json::{Map, Value};
 
@@ -27,6 +28,8 @@ use crate::summary::SummaryConfig;
 
 /// Version of the configuration's meaning; part of its hash.
 pub const SCHEMA: u32 = 1;
+/// Largest file that is read.
+const MAX_BYTES: u64 = 1 << 20;
 
 /// A checked configuration.
 #[derive(Debug, Clone)]
@@ -84,7 +87,7 @@ impl Config {
     /// Unreadable, not TOML, an unknown key or an impossible value.
     pub fn load(path: &Path, overrides: &[String]) -> Result<Self, ConfigError> {
         let place = path.display().to_string();
-        let text = std::fs::read_to_string(path)
+        let text = content::read_text(path, MAX_BYTES)
             .map_err(|source| ConfigError::Read { path: place.clone(), source })?;
         Self::with_overrides(&text, &place, overrides)
     }

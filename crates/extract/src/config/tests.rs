@@ -176,6 +176,11 @@ fn more_work_than_sensible_time_allows_is_refused() {
         ("cqt]\nhop_length = 1\nsparsity = 0", "hop_length"),
         ("hpss]\nhop_length = 1\nkernel_size = 1048576", "kernel_size"),
         ("hpss]\nkernel_size = [31, 1025]", "kernel_size"),
+        // The filter bank took 2 GB.
+        ("melspectrogram]\nn_fft = 262144\nn_mels = 4096", "n_mels"),
+        ("mfcc]\nn_fft = 262144\nn_mels = 4096", "n_mels"),
+        // Not above zero in single precision: NaN in silence.
+        ("spectral_flatness]\namin = 1e-300", "amin"),
     ] {
         let refused = config(&format!("[features.{text}"), &[]).unwrap_err();
         assert!(refused.contains(expected), "{text}: {refused}");

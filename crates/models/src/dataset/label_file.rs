@@ -1,15 +1,17 @@
 //! Label files: CSV with a column that names the recording, and label columns.
 
 use std::collections::{HashMap, HashSet};
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
+use corsmal_files::content;
 use corsmal_files::csv_text::{self, Fault};
 use corsmal_files::quote::quoted;
 
 use super::error::{DatasetError, Result};
 use crate::words::count;
+
+/// Largest file that is read.
+const MAX_BYTES: u64 = 256 << 20;
 
 /// Names of label columns, each with a value for every recording.
 pub(crate) type LabelColumns = Vec<(String, Vec<String>)>;
@@ -70,8 +72,8 @@ impl LabelFile {
     pub fn read(path: &Path, key: Option<&str>) -> Result<Self> {
         let fault = |fault: Fault| DatasetError::content(path, fault.to_string());
         let other = |e: std::io::Error| DatasetError::content(path, e.to_string());
-        let text = BufReader::new(File::open(path).map_err(other)?);
-        let mut reader = csv_text::reader(text).map_err(other)?;
+        let text = content::read(path, MAX_BYTES).map_err(other)?;
+        let mut reader = csv_text::reader(text.as_slice()).map_err(other)?;
         let header = csv_text::header(&mut reader).map_err(fault)?;
         let find = |wanted: &str| header.iter().position(|h| h == wanted);
         let (key, at) = match (key, find("id"), find("path")) {

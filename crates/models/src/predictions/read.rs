@@ -20,13 +20,9 @@ impl PredictionTable {
     /// [`PredictionError`] for a file that is not a table, missing columns, no lines, probabilities
     /// that are not 0 to 1 with sum 1, and predictions that are no class.
     pub fn read(path: &Path) -> Result<Self> {
-        let io = |source| PredictionError::Io { path: path.into(), source };
-        let size = std::fs::metadata(path).map_err(io)?.len();
-        if size > MAX_BYTES {
-            let reason = format!("{size} bytes; prediction files of up to {MAX_BYTES} are read");
-            return Err(content(path, reason));
-        }
-        Self::parse(&std::fs::read(path).map_err(io)?, path)
+        let bytes = corsmal_files::content::read(path, MAX_BYTES)
+            .map_err(|source| PredictionError::Io { path: path.into(), source })?;
+        Self::parse(&bytes, path)
     }
 
     /// The same from bytes; `path` is named in errors.

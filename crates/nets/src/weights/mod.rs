@@ -13,6 +13,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use corsmal_files::content;
+
 pub(crate) use entry::entry;
 pub use entry::trained_here;
 pub use error::WeightsError;
@@ -66,12 +68,12 @@ pub fn read(path: &Path) -> Result<State, WeightsError> {
 /// A whole file, when it is not larger than any weights.
 pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>, WeightsError> {
     let io = |source| WeightsError::Io { path: path.into(), source };
-    let length = std::fs::metadata(path).map_err(io)?.len();
-    if length > MAX_FILE {
-        let reason = format!("{length} bytes: at most {MAX_FILE} are read");
+    // Files are opened more than once, for their kind and for their content.
+    if !std::fs::metadata(path).map_err(io)?.is_file() {
+        let reason = "expected a file, not a pipe or device".into();
         return Err(WeightsError::Content { path: path.into(), reason });
     }
-    std::fs::read(path).map_err(io)
+    content::read(path, MAX_FILE).map_err(io)
 }
 
 /// Writes weights, whole or not at all; `.npz` or `.safetensors`.
