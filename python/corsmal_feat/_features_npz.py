@@ -19,15 +19,23 @@ _NEEDED = ("__meta__", "__config__", "__ids__", "__outcomes__")
 
 def of_npz(name: str) -> dict[str, Any]:
     """The fields of `Features` from an archive. Arrays of frames are read on first access."""
+    # numpy leaves a file open that is no archive.
+    file = open(name, "rb")  # noqa: SIM115
     try:
-        archive = np.load(name, allow_pickle=False)
+        archive = np.load(file, allow_pickle=False)
     except (ValueError, EOFError, zipfile.BadZipFile) as error:
+        file.close()
         raise ParameterError(
             f"{name} is not an output of corsmal-feat: it is not an .npz archive; corsmal_feat.load"
             " reads recordings"
         ) from error
+    except Exception as error:  # whatever zipfile makes of a damaged directory
+        file.close()
+        raise ParameterError(f"{name} is damaged: {error}") from error
     if not isinstance(archive, np.lib.npyio.NpzFile):
+        file.close()
         raise ParameterError(f"{name} is not an output of corsmal-feat: it is a single array")
+    archive.fid = file  # closed with the archive
     try:
         return _fields(archive, name)
     except BaseException:
@@ -44,8 +52,14 @@ def _fields(archive: Any, name: str) -> dict[str, Any]:
         raise ParameterError(
             f"{name} is not an output of corsmal-feat: {why or f'it has no {absent}'}"
         )
+    # A directory entry that is part of another one: we write neither comments nor such fields.
+    if any(info.comment or b"PK\1\2" in info.extra for info in archive.zip.infolist()):
+        raise ParameterError(f"{name} is damaged: its directory hides members")
     frames = [member for member in members if _is_frames(member)]
     run = {k: read_member(archive, name, k) for k in members if not _is_frames(k)}
+    if "__summary__" in run:
+        for member in frames:  # none of ours: added, or of a name that damage has changed
+            read_member(archive, name, member)
     config = json.loads(run["__config__"].tobytes())
     arrays: dict[str, Any] = {}
     times: dict[str, Any] = {}
@@ -58,19 +72,44 @@ def _fields(archive: Any, name: str) -> dict[str, Any]:
             into.setdefault(recording, {})[feature] = member
         else:
             into[key] = member
+    ids = [str(i) for i in run["__ids__"]]
+    summary, names = run.get("__summary__"), [str(n) for n in run.get("__summary_names__", ())]
+    if summary is not None and summary.shape != (len(ids), len(names)):
+        raise ParameterError(
+            f"{name} is damaged: a summary of shape {summary.shape} of {len(ids)} recordings and"
+            f" {len(names)} names"
+        )
+    if summary is None:
+        keys = list(config["features"]) if several else None
+        for what, found in (("frames", arrays), ("times", times)):
+            _require(name, what, found, ids, keys)
     if not frames:
         archive.close()
     return {
-        "ids": [str(i) for i in run["__ids__"]],
+        "ids": ids,
         "arrays": Members(archive, name, arrays) if arrays else {},
         "times": Members(archive, name, times) if times else {},
-        "summary": run.get("__summary__"),
-        "names": [str(n) for n in run.get("__summary_names__", ())],
+        "summary": summary,
+        "names": names,
         "labels": {k.removeprefix(_LABELS): v for k, v in run.items() if k.startswith(_LABELS)},
         "config": config,
         "config_hash": json.loads(run["__meta__"].tobytes())["config_hash"],
         "outcomes": [json.loads(line) for line in run["__outcomes__"].tobytes().splitlines()],
     }
+
+
+def _require(
+    name: str, what: str, found: dict[str, Any], ids: list[str], features: list[str] | None
+) -> None:
+    """Refuses members that are not those of the recordings: damage renames or hides some."""
+    wanted = set(ids)
+    other = wanted ^ found.keys()
+    if features is not None:
+        other |= {i for i in wanted & found.keys() if found[i].keys() != set(features)}
+    if other:
+        first = min(other)
+        kind = "has" if first in found and first not in wanted else "lacks"
+        raise ParameterError(f"{name} is damaged: it {kind} {what} of {first!r}")
 
 
 def _holds_objects(archive: Any, member: str) -> bool:

@@ -140,7 +140,7 @@ def _read(name: str) -> tuple[dict[str, Any], Any]:
     check_parquet(name)
     try:
         # Of one file: its folder, `label=value`, says nothing here.
-        table = parquet.ParquetFile(name).read()
+        table = parquet.ParquetFile(name, page_checksum_verification=True).read()
     except failed as error:
         raise ParameterError(f"{name} is not a readable Parquet file: {error}") from error
     metadata = table.schema.metadata or {}

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import zipfile
-import zlib
 from collections.abc import Iterator, MutableMapping
 from typing import Any
 
@@ -14,15 +12,6 @@ import numpy.typing as npt
 from .errors import ParameterError
 
 Values = npt.NDArray[Any]
-#: What numpy and zipfile say of members that they cannot read.
-_DAMAGED = (
-    ValueError,
-    EOFError,
-    MemoryError,
-    NotImplementedError,
-    zipfile.BadZipFile,
-    zlib.error,
-)
 #: The member of a recording, or of each of its features.
 Names = str | dict[str, str]
 
@@ -39,7 +28,7 @@ def read_member(archive: Any, name: str, member: str) -> Values:
     try:
         with archive.zip.open(f"{member}.npy") as file:
             values: Values = np.lib.format.read_array(file, allow_pickle=False)
-    except _DAMAGED as error:
+    except Exception as error:  # whatever numpy and zipfile make of damaged bytes
         what = "holds Python objects" if "pickle" in str(error) else f"cannot be read: {error}"
         raise ParameterError(f"{name}: member {member} {what}") from error
     return values

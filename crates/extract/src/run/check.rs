@@ -8,6 +8,7 @@ use corsmal_files::feature_file::{FeatureFileError, FeatureTable};
 use corsmal_files::format::{OutputFormat, require_npz};
 use corsmal_files::layout::TIMES;
 use corsmal_files::outcome::Outcome;
+use corsmal_files::parquet::ParquetTableError;
 use corsmal_files::provenance::Provenance;
 use corsmal_files::{draft, identity, partition};
 
@@ -225,6 +226,9 @@ impl Finished<'_> {
         };
         let (opened, label) = opened.map_err(|error| match error {
             FeatureFileError::Io { source, .. } => refuse(&format!("cannot be read: {source}")),
+            FeatureFileError::Parquet(ParquetTableError::Damaged { reason, .. }) => {
+                refuse(&format!("is damaged: {reason}"))
+            }
             _ => refuse("is not an output of this tool"),
         })?;
         if let Some(label) = label.filter(|label| Some(label.as_str()) != self.by) {

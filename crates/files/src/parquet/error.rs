@@ -27,6 +27,14 @@ pub enum ParquetTableError {
         /// Its reason.
         source: ParquetError,
     },
+    /// A file of ours does not match its hashes.
+    #[error("{path}: the file is damaged: {reason}; write it again")]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What does not match.
+        reason: String,
+    },
     /// Not a table of this tool.
     #[error("{path}: expected {expected}, found {actual}")]
     Layout {
@@ -51,8 +59,23 @@ pub(super) fn io(path: &Path, source: std::io::Error) -> ParquetTableError {
     ParquetTableError::Io { path: path.into(), source }
 }
 
+/// What does not match, among the errors of the Parquet layer.
+#[derive(Debug, Error)]
+#[error("{0}")]
+pub(super) struct Damage(pub String);
+
 pub(super) fn layer(path: &Path, source: ParquetError) -> ParquetTableError {
-    ParquetTableError::Parquet { path: path.into(), source }
+    let path = path.into();
+    match damage(&source) {
+        Some(Damage(reason)) => ParquetTableError::Damaged { path, reason: reason.clone() },
+        None => ParquetTableError::Parquet { path, source },
+    }
+}
+
+fn damage(source: &ParquetError) -> Option<&Damage> {
+    let ParquetError::External(inner) = source else { return None };
+    let read = inner.downcast_ref::<std::io::Error>().and_then(|e| e.get_ref());
+    inner.downcast_ref().or_else(|| read?.downcast_ref())
 }
 
 pub(super) fn layout(

@@ -71,9 +71,9 @@ impl ParquetFile {
     /// other tools have none.
     ///
     /// # Errors
-    /// [`ParquetTableError::Parquet`] when it is damaged.
+    /// [`ParquetTableError::Damaged`].
     pub fn check(&self) -> Result<(), ParquetTableError> {
-        self.sealed.check_all().map_err(|e| layer(&self.path, e))
+        shielded(&self.path, || self.sealed.check_all().map_err(|e| layer(&self.path, e)))
     }
 
     /// How an output of ours was made.

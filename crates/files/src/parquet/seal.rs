@@ -15,7 +15,8 @@ use parquet::file::metadata::{FileMetaData, KeyValue};
 use parquet::file::reader::{ChunkReader, Length};
 use parquet::file::writer::SerializedFileWriter;
 
-use super::keys::{BLOCKS, HASH, WRITER};
+use super::error::Damage;
+use super::keys::{BLOCKS, HASH, META, WRITER};
 
 /// Bytes that share a hash.
 const BLOCK: u64 = 1 << 20;
@@ -47,9 +48,11 @@ impl Write for SealingWriter {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let written = self.out.write(bytes)?;
         self.rest.extend_from_slice(&bytes[..written]);
-        while !self.last && self.rest.len() >= BLOCK as usize {
-            self.blocks.push_str(&digits(&self.rest[..BLOCK as usize]));
-            self.rest.drain(..BLOCK as usize);
+        if !self.last {
+            let blocks = self.rest.chunks_exact(BLOCK as usize);
+            let open = blocks.remainder().len();
+            blocks.for_each(|block| self.blocks.push_str(&digits(block)));
+            self.rest.drain(..self.rest.len() - open);
         }
         Ok(written)
     }
@@ -110,7 +113,7 @@ impl SealedFile {
         Ok(Self { file: Arc::new(Mutex::new(file)), length, blocks: Arc::default() })
     }
 
-    /// Takes the hashes out of the metadata, whose bytes `footer` begin at `start`, and checks that of the
+    /// Reads the hashes from the metadata, whose bytes `footer` begin at `start`, and checks that of the
     /// rest. Files of other tools, and those of version 0.1.0, have none.
     pub fn check(
         &self,
@@ -126,14 +129,17 @@ impl SealedFile {
             pairs.filter(|pair| pair.key == key).find_map(|pair| pair.value.as_deref())
         };
         let (blocks, hash) = match (find(BLOCKS), find(HASH)) {
-            (None, None) => return Ok(()),
+            (None, None) if find(META).is_some() => return Ok(()),
+            (None, None) => return Err(damaged("its metadata are not where they belong")),
             (Some(blocks), Some(hash)) => (blocks, hash),
             _ => return Err(damaged("its metadata have one of two hashes")),
         };
         let count = blocks.len() / DIGITS;
         let rest = count as u64 * BLOCK;
         let place = place_of_hash(footer).map(|place| start + place as u64);
-        let place = place.filter(|place| *place >= rest && blocks.len() == count * DIGITS);
+        let are_digits =
+            blocks.len() == count * DIGITS && blocks.bytes().all(|digit| digit.is_ascii_hexdigit());
+        let place = place.filter(|place| *place >= rest && are_digits);
         let place = place.ok_or_else(|| damaged("its hashes are not where they belong"))?;
         if self.hash_of_rest(rest, place)? != hash {
             return Err(damaged("its metadata do not match their hash"));
@@ -175,7 +181,7 @@ impl SealedFile {
             let block = self.read(i * BLOCK, BLOCK as usize)?;
             if digits(&block) != blocks.digits[i as usize * DIGITS..][..DIGITS] {
                 let (from, to) = (i * BLOCK, (i + 1) * BLOCK);
-                return Err(damaged(&format!("bytes {from} to {to} do not match their hash")));
+                return Err(damaged(format!("bytes {from} to {to} do not match their hash")));
             }
             sound.store(true, Ordering::Relaxed);
         }
@@ -195,8 +201,8 @@ impl SealedFile {
     }
 }
 
-fn damaged(how: &str) -> ParquetError {
-    ParquetError::General(format!("the file is damaged: {how}"))
+fn damaged(how: impl Into<String>) -> ParquetError {
+    ParquetError::External(Box::new(Damage(how.into())))
 }
 
 impl Length for SealedFile {
@@ -229,7 +235,10 @@ impl Read for SealedRead {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         let left = self.file.length.saturating_sub(self.at).min(PIECE);
         let count = out.len().min(left as usize);
-        let bytes = self.file.get_bytes(self.at, count).map_err(io::Error::other)?;
+        let bytes = self.file.get_bytes(self.at, count).map_err(|e| match e {
+            ParquetError::External(inner) => io::Error::other(inner),
+            other => io::Error::other(other),
+        })?;
         out[..count].copy_from_slice(&bytes);
         self.at += count as u64;
         Ok(count)
