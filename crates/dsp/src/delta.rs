@@ -81,7 +81,14 @@ pub fn delta_weights(p: &DeltaParams) -> Result<Vec<f64>> {
         factorial *= degree as f64;
     }
     let norm = dot(&current, &current);
-    Ok(current.iter().map(|v| factorial * v / norm).collect())
+    let weights: Vec<f64> = current.iter().map(|v| factorial * v / norm).collect();
+    match weights.iter().all(|weight| weight.is_finite()) {
+        true => Ok(weights),
+        false => {
+            let allowed = "so low, for this width, that the weights stay finite";
+            Err(DspError::parameter("order", p.order, allowed))
+        }
+    }
 }
 
 /// Derivative of each row of `data [rows, frames]` along the frames.
@@ -180,6 +187,16 @@ mod tests {
         let w = delta_weights(&DeltaParams::default()).unwrap();
         for (i, w) in w.iter().enumerate() {
             assert!((w - (i as f64 - 4.0) / 60.0).abs() < 1e-15);
+        }
+    }
+
+    /// They were NaN, and so was every value.
+    #[test]
+    fn weights_that_are_not_finite_are_refused() {
+        for (width, order) in [(301, 100), (201, 171), (401, 200)] {
+            let p = DeltaParams { width, order, ..DeltaParams::default() };
+            let refused = delta_weights(&p).unwrap_err().to_string();
+            assert!(refused.contains("order") && refused.contains("finite"), "{refused}");
         }
     }
 

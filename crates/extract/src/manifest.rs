@@ -5,7 +5,7 @@
 //! for its index, are ignored. Relative paths are relative to the manifest.
 //!
 //! Time and memory grow with the size of the file, within [`MAX_LINE`], [`MAX_COLUMNS`] and
-//! [`MAX_CELLS`].
+//! [`MAX_CELLS`](crate::inputs::cells::MAX_CELLS).
 
 use std::collections::{HashMap, HashSet};
 use std::fs::File;
@@ -17,6 +17,7 @@ use corsmal_files::quote::{printable, quoted, shown};
 use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, Visitor};
 use serde_json::Value;
 
+use crate::inputs::cells::require_cells;
 use crate::inputs::error::InputError;
 
 /// File name extensions of manifests, lower case.
@@ -26,9 +27,6 @@ pub const EXTENSIONS: [&str; 3] = ["csv", "jsonl", "ndjson"];
 pub const MAX_LINE: usize = 1 << 20;
 /// Most columns of a CSV, and most different keys of JSON lines.
 pub const MAX_COLUMNS: usize = 4096;
-/// Most label values, rows times label columns: every row has a value, empty it may be, for each.
-pub const MAX_CELLS: usize = 1 << 24;
-
 const PATH: &str = "path";
 pub(crate) const ID: &str = "id";
 const START: &str = "start";
@@ -57,16 +55,6 @@ pub(crate) fn read(path: &Path) -> Result<Vec<Entry>, InputError> {
 
 fn wrong(path: &Path, line: u64, reason: impl AsRef<str>) -> InputError {
     InputError::Manifest { path: path.into(), line, reason: printable(reason.as_ref()) }
-}
-
-/// Refuses tables that would not fit in memory.
-pub(crate) fn require_cells(rows: usize, columns: usize) -> Result<(), String> {
-    match rows.checked_mul(columns) {
-        Some(cells) if cells <= MAX_CELLS => Ok(()),
-        _ => Err(format!(
-            "{rows} rows with {columns} label columns are too many: at most {MAX_CELLS} label values"
-        )),
-    }
 }
 
 /// Passes bytes through, up to a line that is too long.
@@ -103,6 +91,8 @@ fn open(path: &Path) -> Result<BufReader<Short<File>>, InputError> {
 struct ManifestColumns {
     places: HashMap<String, usize>,
     labels: Vec<(usize, String)>,
+    /// Bytes of the names of labels.
+    bytes: usize,
 }
 
 impl ManifestColumns {
@@ -126,6 +116,7 @@ impl ManifestColumns {
         self.places.insert(name.into(), place);
         if ![PATH, ID, START, END].contains(&name) {
             self.labels.push((place, name.into()));
+            self.bytes += name.len();
         }
         Ok(place)
     }
@@ -151,6 +142,11 @@ impl ManifestColumns {
             }
             _ => Ok(()),
         }
+    }
+
+    /// Refuses more than so many rows should hold.
+    fn require(&self, rows: usize) -> Result<(), String> {
+        require_cells(rows, self.labels.len(), self.bytes)
     }
 
     fn entry(
@@ -226,7 +222,7 @@ fn csv_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
         let (line, record) = found.map_err(|fault| failed(fault, &reader))?;
         let cell = |place: usize| record.get(cells[place]).unwrap_or_default().to_owned();
         rows.push(columns.entry(path, line, cell)?);
-        require_cells(rows.len(), columns.labels.len()).map_err(|e| wrong(path, line, e))?;
+        columns.require(rows.len()).map_err(|e| wrong(path, line, e))?;
     }
 }
 
@@ -263,7 +259,7 @@ fn json_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
             cells.push((place, value));
         }
         rows.push((line, cells));
-        require_cells(rows.len(), columns.labels.len()).map_err(|e| wrong(path, line, e))?;
+        columns.require(rows.len()).map_err(|e| wrong(path, line, e))?;
     }
     columns.check_times().map_err(|(places, reason)| {
         let first =

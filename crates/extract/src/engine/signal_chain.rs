@@ -45,6 +45,8 @@ pub struct SignalChain {
     held: Option<(Normalize, Vec<f32>)>,
     /// Frames still to be given, where a length is configured.
     remaining: Option<u64>,
+    /// Whether any sample came: nothing is not filled up with silence.
+    begun: bool,
     mixed: Vec<f32>,
 }
 
@@ -73,6 +75,7 @@ impl SignalChain {
             before: Vec::new(),
             held: (config.normalize != Normalize::None).then(|| (config.normalize, Vec::new())),
             remaining: (config.length > 0.0).then(|| (config.length * sample_rate).round() as u64),
+            begun: false,
             mixed: Vec::new(),
         })
     }
@@ -107,6 +110,7 @@ impl SignalChain {
     /// Takes interleaved input frames, appends interleaved output frames.
     pub fn push(&mut self, input: &[f32], out: &mut Vec<f32>) {
         let from = out.len();
+        self.begun |= !input.is_empty();
         match self.resample.take() {
             None => mix(&self.rule, self.channels_in, input, out),
             Some(mut stream) => {
@@ -144,7 +148,7 @@ impl SignalChain {
         if !push(&rest)? {
             return Ok(false);
         }
-        let mut silence = self.remaining.unwrap_or(0);
+        let mut silence = self.remaining.filter(|_| self.begun).unwrap_or(0);
         let room = (SILENCE / self.channels).max(1);
         rest.clear();
         rest.resize(room.min(usize::try_from(silence).unwrap_or(room)) * self.channels, 0.0);
@@ -284,6 +288,13 @@ mod tests {
             assert_eq!(cut, [0.25, 0.5, 0.0, 0.25]);
         }
         assert_eq!(run(&with(Normalize::Peak), 1, &[0.0; 5], 2), [0.0; 4]);
+    }
+
+    #[test]
+    fn nothing_is_not_filled_up() {
+        let config = SignalConfig { length: 0.12, ..SignalConfig::default() };
+        assert!(run(&config, 1, &[], 1).is_empty());
+        assert_eq!(run(&config, 1, &[0.5], 1).len(), 12);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use corsmal_dsp::decibel::Decibel;
 use corsmal_dsp::mel::{MelParams, SparseBank, mel_filter};
 
 use super::kernel::{SlotFn, SlotKernel};
-use super::mel_bands::{check_n_mels, empty};
+use super::mel_bands::{check_bank, empty};
 use super::melspectrogram::quantity_of;
 
 /// `bank @ magnitude^power`, times a factor or in decibels without a clamp.
@@ -28,7 +28,7 @@ pub enum Unit {
 impl ExactMel {
     /// The kernel for a filter bank; `power` is 1 or 2.
     pub fn new(params: &MelParams, power: f64, unit: Unit) -> corsmal_dsp::Result<Self> {
-        check_n_mels(params.n_mels)?;
+        check_bank(params)?;
         quantity_of(power)?;
         let bank = mel_filter(params)?;
         let empty = empty(&bank);

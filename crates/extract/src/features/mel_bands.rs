@@ -1,5 +1,6 @@
 //! What mel features share: the filter bank on rows, decibels, and the clamp below the maximum.
 
+use corsmal_dsp::DspError;
 use corsmal_dsp::decibel::Decibel;
 use corsmal_dsp::lanes::{Row, power_to_decibel};
 use corsmal_dsp::mel::{MelParams, SparseBank, empty_filters, mel_filter};
@@ -36,15 +37,24 @@ pub struct MelKernel {
 /// More bands than any use has; bounds the memory of filter bank and cosine transform.
 const MAX_MELS: usize = 4096;
 
-/// Refuses more bands than that.
-pub fn check_n_mels(n_mels: usize) -> corsmal_dsp::Result<()> {
-    at_most("n_mels", n_mels, MAX_MELS)
+/// Most values of a filter bank, which is made with its zeros (256 MiB).
+const MAX_VALUES: usize = 1 << 26;
+
+/// Refuses filter banks larger than that.
+pub fn check_bank(params: &MelParams) -> corsmal_dsp::Result<()> {
+    at_most("n_mels", params.n_mels, MAX_MELS)?;
+    let bins = params.n_fft / 2 + 1;
+    if bins.saturating_mul(params.n_mels) > MAX_VALUES {
+        let allowed = format!("at most {} with n_fft = {}", MAX_VALUES / bins, params.n_fft);
+        return Err(DspError::parameter("n_mels", params.n_mels, allowed));
+    }
+    Ok(())
 }
 
 impl MelKernel {
     /// The kernel for a filter bank.
     pub fn new(params: &MelParams, scale: Scale, db: Decibel) -> corsmal_dsp::Result<Self> {
-        check_n_mels(params.n_mels)?;
+        check_bank(params)?;
         let bank = mel_filter(params)?;
         Ok(Self { bank: SparseBank::new(&bank), scale, db, empty: empty(&bank) })
     }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::kernel::{Extent, Feature, WholeKernel};
 use super::kind::FeatureKind;
-use super::mel_bands::{check_n_mels, empty};
+use super::mel_bands::{check_bank, empty};
 use super::rise::{Rise, RiseSpec};
 use crate::params::Keys;
 
@@ -56,7 +56,7 @@ impl FeatureKind for OnsetStrength {
 
     fn plan(&self, sr: f64) -> corsmal_dsp::Result<Feature> {
         let Rise { stft, mel, onset } = self.rise.params(sr)?;
-        check_n_mels(mel.n_mels)?;
+        check_bank(&mel)?;
         let bank = mel_filter(&mel)?;
         let extent = Extent::Frames(stft.hop_length as f64);
         let empty = empty(&bank);

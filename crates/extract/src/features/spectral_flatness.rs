@@ -1,5 +1,6 @@
 //! `spectral_flatness`: how noise-like a spectrum is.
 
+use corsmal_dsp::DspError;
 use corsmal_dsp::spectral::Flatness;
 use serde::{Deserialize, Serialize};
 
@@ -49,6 +50,13 @@ impl FeatureKind for SpectralFlatness {
         let stft = self.stft.params()?;
         let params = Flatness { amin: self.amin, power: self.power };
         params.check()?;
+        if self.amin < f64::from(f32::MIN_POSITIVE) {
+            return Err(DspError::parameter(
+                "amin",
+                self.amin,
+                "at least 1.2e-38, since features are single precision",
+            ));
+        }
         Ok(Feature::exact(stft, Means(params), vec![String::new()]))
     }
 }

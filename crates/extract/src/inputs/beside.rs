@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use corsmal_files::quote::quoted;
 
+use super::cells::{MAX_CELLS, MAX_LABEL_BYTES};
 use super::member::Member;
-use crate::manifest::MAX_CELLS;
 
 /// A recording with what stands beside it.
 pub(super) struct Entry {
@@ -32,7 +32,7 @@ pub(super) fn join(recordings: &mut [Entry], labels: Vec<Labels>) -> Result<(), 
         alike.entry(stem(&recording.name)).or_default().push(i);
         samples.entry(sample(&recording.name)).or_default().push(i);
     }
-    let mut cells = 0;
+    let (mut cells, mut bytes) = (0, 0);
     for (name, fields) in labels {
         let (stem, sample) = (stem(&name), sample(&name));
         let of = match stem == sample {
@@ -44,6 +44,16 @@ pub(super) fn join(recordings: &mut [Entry], labels: Vec<Labels>) -> Result<(), 
         cells += of.len().saturating_mul(fields.len());
         if cells > MAX_CELLS {
             return Err(format!("its recordings have more than {MAX_CELLS} labels"));
+        }
+        let length: usize = fields.iter().map(|(column, value)| column.len() + value.len()).sum();
+        bytes += of.len().saturating_mul(length);
+        if bytes > MAX_LABEL_BYTES {
+            let name = quoted(&name.to_string_lossy());
+            return Err(format!(
+                "its labels have more than {MAX_LABEL_BYTES} bytes in all recordings together; {name} gives \
+                 {length} to each of {}",
+                of.len()
+            ));
         }
         for &i in of {
             recordings[i].labels.extend_from_slice(&fields);

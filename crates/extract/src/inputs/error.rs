@@ -85,6 +85,16 @@ pub enum InputError {
         /// Why.
         reason: String,
     },
+    /// A tar has a member twice.
+    #[error(
+        "{}: the archive is named twice, or has this member twice, as after `tar -r` or `tar -u`; name the \
+         archive once, or extract it and pack it again",
+        line(path)
+    )]
+    MemberTwice {
+        /// The member, in the archive.
+        path: PathBuf,
+    },
     /// Two inputs cannot be told apart.
     #[error(
         "{first} and {second} both have the id {id:?}; name each once, or give ids in a manifest"

@@ -85,6 +85,12 @@ pub(super) fn assign(found: &[Found]) -> Result<Vec<String>, InputError> {
                 }
             }
             if changed.len() == before {
+                if let (InputSource::Member(one), InputSource::Member(other)) =
+                    (&found[group[0]].source, &found[group[1]].source)
+                    && one.path == other.path
+                {
+                    return Err(InputError::MemberTwice { path: one.path.clone() });
+                }
                 return Err(InputError::Duplicate {
                     id: forms(&found[group[0]]).swap_remove(0),
                     first: found[group[0]].described(),

@@ -1,7 +1,7 @@
 //! From what the user names to the list of recordings of a run.
 //!
 //! A name is, in this order of interpretation: `-` (a recording on standard input), an object of a
-//! store (`s3://bucket/x`; below), an existing file (a manifest if its extension is one of [`manifest::EXTENSIONS`], an archive if it is `.tar`,
+//! store (`s3://bucket/x`; below), an existing file (a manifest if its extension is one of [`manifest::EXTENSIONS`](crate::manifest::EXTENSIONS), an archive if it is `.tar`,
 //! else a recording), an existing folder, a list in braces as `{000..012}.tar` or `{a,b}.wav`, or a
 //! glob. A name such as `s3://bucket/x` is never looked for on a disk: it is an object, a folder of them where it ends with a
 //! slash or no object has it, a list in braces or a glob. Folders and globs give files with an audio extension only, follow
@@ -19,6 +19,7 @@
 mod archive;
 mod beside;
 mod braces;
+pub(crate) mod cells;
 mod disk;
 pub(crate) mod error;
 mod folder;
@@ -38,7 +39,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::manifest;
+use corsmal_files::quote::quoted;
+
 use search::{Search, no_audio, told};
 
 pub use error::InputError;
@@ -137,8 +139,20 @@ pub fn collect_until<S: AsRef<OsStr>>(
             columns.push(column.clone());
         }
     }
-    manifest::require_cells(found.len(), columns.len())
+    let bytes = columns.iter().map(String::len).sum();
+    cells::require_cells(found.len(), columns.len(), bytes)
         .map_err(|reason| InputError::Labels { reason })?;
+    for (found, id) in found.iter().zip(&ids) {
+        // numpy's texts end before it.
+        let has_nul = |(column, value): &&(String, String)| {
+            [column, value].into_iter().any(|text| text.contains('\0'))
+        };
+        if let Some((column, _)) = found.labels.iter().find(has_nul) {
+            let column = quoted(column);
+            let reason = format!("{id}: the label {column} has a NUL character: remove it");
+            return Err(InputError::Labels { reason });
+        }
+    }
     let inputs = found.into_iter().zip(ids).map(|(found, id)| {
         let mut values: BTreeMap<String, String> = found.labels.into_iter().collect();
         let labels = columns.iter().map(|c| (c.clone(), values.remove(c).unwrap_or_default()));

@@ -1,12 +1,13 @@
 //! A run whose output is open: what it has done before, and how it is completed.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use corsmal_files::draft;
 use corsmal_files::format::OutputFormat;
+use corsmal_files::identity;
 use corsmal_files::npz::Compression;
 use corsmal_files::provenance::Provenance;
 
@@ -172,7 +173,7 @@ fn resume(
 ) -> Result<(Ledger, Vec<Record>), RunError> {
     // A file that has changed, repaired it may be, is read again, and so is what follows it. What
     // cannot be read just now may be the same: nothing done is given up for it.
-    let unreadable = RefCell::new(None);
+    let (unreadable, unversioned) = (RefCell::new(None), Cell::new(false));
     let identities = Identities::of(inputs, stop);
     let keep = |i: usize, record: &Record| {
         let Some(input) = inputs.get(i).filter(|input| input.id == record.outcome.id) else {
@@ -187,10 +188,20 @@ fn resume(
             unreadable.replace(Some(input.source.to_string()));
             return true;
         }
+        let id = &record.outcome.id;
+        if input.source.comes_once() {
+            let why = "came from a stream, which may be another one now";
+            progress.warning(&format!("{id} {why}; the run continues from there"));
+            return false;
+        }
         let same = record.outcome.identity == now;
         if !same {
-            let id = &record.outcome.id;
             progress.warning(&format!("{id} has changed; the run continues from there"));
+        } else if now == identity::STREAM && !unversioned.replace(true) {
+            progress.warning(&format!(
+                "{id}: its server gives neither ETag nor Last-Modified, which would tell whether it has changed; its \
+                 features are kept (reported once per run)"
+            ));
         }
         same
     };

@@ -59,7 +59,11 @@ pub(super) fn mixed(outcomes: &[Outcome]) -> Option<String> {
     let mut mixed = BTreeSet::new();
     for outcome in outcomes {
         let Outcome { path, identity, status, start_frame, .. } = outcome;
-        let is_read = status.has_features() && start_frame.is_some() && !identity.is_empty();
+        // Names that are not UTF-8 look alike in an outcome.
+        let is_read = status.has_features()
+            && start_frame.is_some()
+            && !identity.is_empty()
+            && !path.contains(char::REPLACEMENT_CHARACTER);
         if is_read && *seen.entry(path).or_insert(identity) != identity {
             mixed.insert(path.as_str());
         }

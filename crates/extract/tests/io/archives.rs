@@ -355,3 +355,25 @@ fn archives_in_manifests_are_refused_in_words() {
     assert!(collect(&manifest).unwrap_err().contains("line 2: "));
     assert!(collect(&manifest).unwrap_err().contains("give it as an input"));
 }
+
+/// One member of a megabyte labelled every recording, each with a copy.
+#[test]
+fn labels_of_many_recordings_are_bounded() {
+    let folder = tempfile::tempdir().unwrap();
+    let names: Vec<String> = (0..1200).map(|i| format!("x.{i}.wav")).collect();
+    let label = format!("{{\"t\": \"{}\"}}", "v".repeat(1_000_000));
+    let mut members: Vec<(&str, &[u8])> =
+        names.iter().map(|name| (&**name, &b"RIFF"[..])).collect();
+    members.push(("x.json", label.as_bytes()));
+    let refused = collect(&archive(&folder, "a.tar", &members)).unwrap_err();
+    assert!(refused.contains("gives 1000001 to each of 1200"), "{refused}");
+}
+
+#[test]
+fn a_member_that_is_there_twice_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let (one, two) = (wav(1), wav(2));
+    let members: [(&str, &[u8]); 2] = [("r.wav", &one), ("r.wav", &two)];
+    let refused = collect(&archive(&folder, "a.tar", &members)).unwrap_err();
+    assert!(refused.contains("a.tar/r.wav: the archive is named twice, or has this member twice"), "{refused}");
+}

@@ -197,3 +197,13 @@ fn columns_that_look_like_times_are_told() {
     assert_eq!(told("path,start,onset\na.wav,0.5,1\n"), None);
     assert_eq!(told("path,class\na.wav,x\n"), None);
 }
+
+/// They became other labels in an `.npz`, whose texts end before it.
+#[test]
+fn labels_with_a_nul_are_refused() {
+    let dir = folder(&["a.wav"]);
+    let list = dir.path().join("m.jsonl");
+    fs::write(&list, "{\"path\": \"a.wav\", \"room\": \"x\\u0000\"}\n").unwrap();
+    let refused = inputs::collect(&[&list]).unwrap_err().to_string();
+    assert!(refused.contains("the label \"room\" has a NUL character"), "{refused}");
+}

@@ -7,7 +7,7 @@ use std::process::Stdio;
 use corsmal_files::outcome::Status;
 
 use super::support::{Ended, ended, extract, extraction, folder, table, wav};
-use crate::command::tool;
+use crate::command::{text, tool};
 
 #[test]
 fn a_reader_that_has_seen_enough_is_no_error() {
@@ -122,4 +122,19 @@ fn a_named_pipe_is_read_once_and_from_its_beginning() {
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
     assert_eq!(crate::command::interrupt(&mut child), Some(130));
+}
+
+/// A run that was resumed kept the features of the stream before.
+#[test]
+fn a_resumed_run_reads_its_stream_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let one = wav(&folder.path().join("1.wav"), 1, 4000, 1);
+    let two = wav(&folder.path().join("2.wav"), 1, 8000, 2);
+    let bad = folder.path().join("bad.wav");
+    std::fs::write(&bad, "RIFF").unwrap();
+    let out = folder.path().join("feats.npz");
+    piped(&one, &out, &["--in", text(&bad), "--max-errors", "0"]).with(2);
+    let run = piped(&two, &out, &["--in", text(&bad), "--resume"]).with(1);
+    assert!(run.stderr.contains("came from a stream"), "{}", run.stderr);
+    assert_eq!(table(&out).outcomes()[0].decoded_frames, 8000);
 }
