@@ -8,7 +8,9 @@ use std::sync::atomic::AtomicBool;
 use corsmal_ccm::CcmError;
 use corsmal_ccm::capacity::{Problem, Views};
 use corsmal_ccm::crop::{self, Written, crops};
-use corsmal_ccm::dataset::{Container, DataSet, Filling, FillingLevel, FillingType, SequenceName};
+use corsmal_ccm::dataset::{
+    Container, DataSet, Filling, FillingLevel, FillingType, SequenceName, Subset,
+};
 use corsmal_ccm::synth::write_views;
 use corsmal_vision::{Mask, Rgb, read_detections};
 
@@ -240,6 +242,27 @@ fn tables_are_found_in_a_folder_of_their_own() {
         let found = Views::of(&recording, Some(&tables)).detections().unwrap().unwrap();
         assert_eq!(found.len(), 1 + recording.part as usize, "{place}");
     }
+    // Labels that come later tell the containers.
+    let labels = "id,container id,scenario,background,illumination,width at the top,width at the bottom,height,depth,\
+        container capacity,container mass,filling type,filling level,filling density,filling mass,object mass\n\
+        7,10,0,1,0,97.1,60.4,117.9,-1,520,10,0,0,0,0,10\n";
+    write(&data.join("test_pub/ccm_test_pub_annotation.csv"), labels.as_bytes());
+    let set = DataSet::open(&data).unwrap();
+    let labelled = set.recordings.iter().find(|r| r.part == Subset::Public).unwrap();
+    assert_eq!(labelled.container.map(|c| c.number()), Some(10));
+    let views = Views::of(labelled, Some(&tables));
+    assert_eq!(views.detections().unwrap().unwrap().len(), 1 + Subset::Public as usize);
+    assert_eq!(views.table_in(&tables), tables.join("public-test/000007.json"));
+    write(&tables.join("10/000007.json"), b"[]");
+    let Err(Problem::Damaged(two)) = views.detections() else { panic!("two tables") };
+    assert!(two.contains("are tables of the same recording"), "{two}");
+    // The others are said to have none.
+    std::fs::remove_file(tables.join("private-test/000007.json")).unwrap();
+    let said = corsmal_ccm::capacity::without_tables(&set.recordings, Some(&tables)).unwrap();
+    assert!(
+        said.contains("1 of 3 recordings have no table") && said.contains("private-test"),
+        "{said}"
+    );
 }
 
 #[test]

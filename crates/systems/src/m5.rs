@@ -104,7 +104,16 @@ fn embeddings(
     }
     let mut places: HashMap<&str, (usize, usize)> = HashMap::new();
     for (s, (_, set)) in sets.iter().enumerate() {
-        places.extend(set.ids.iter().enumerate().map(|(row, id)| (id.as_str(), (s, row))));
+        for (row, id) in set.ids.iter().enumerate() {
+            if let Some((other, _)) = places.insert(id, (s, row)) {
+                return Err(learning.fault(&format!(
+                    "{} and {}: both have {name} embeddings of {id}; leave one out or, if they are of different recordings, \
+                     use ids such as 1/s0_fi1_fu1_b0_l0",
+                    sets[other].0.display(),
+                    sets[s].0.display()
+                )));
+            }
+        }
     }
     let find = |subject: &corsmal_ccm::benchmark::Subject| {
         let named = subject.container.zip(subject.name).map(|(c, n)| format!("{c}/{n}"));

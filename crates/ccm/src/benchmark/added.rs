@@ -113,11 +113,28 @@ impl Added {
     fn choose(&self, parts: &mut Vec<Part<'_>>) -> Result<()> {
         let fits = |part: &Part<'_>| part.is_whole() && part.unknown.is_empty();
         let mut fitting: Vec<Subset> = parts.iter().filter(|p| fits(p)).map(|p| p.subset).collect();
+        let count = self.by_name.len();
         if fitting.len() > 1 {
-            fitting.retain(|&subset| size(subset) == self.by_name.len());
+            let exact = |p: &&Part<'_>| fits(p) && p.targets.len() == count;
+            let exact: Vec<Subset> = parts.iter().filter(exact).map(|p| p.subset).collect();
+            fitting.retain(|&subset| match exact.is_empty() {
+                true => size(subset) == count,
+                false => exact.contains(&subset),
+            });
         }
         match fitting.as_slice() {
             [one] => {
+                let there = parts.iter().find(|p| p.subset == *one).map_or(0, |p| p.targets.len());
+                // What fits in part may be of another part, of which recordings are missing.
+                if count != there && count != size(*one) {
+                    return Err(CcmError::Request(format!(
+                        "{}: {there} of its {count} ids are those of the {} recordings; give these alone, or all {} \
+                         of the part",
+                        self.path.display(),
+                        one.name(),
+                        size(*one)
+                    )));
+                }
                 let others = parts.iter_mut().filter(|p| p.subset != *one);
                 others.for_each(Part::clear);
                 Ok(())
@@ -131,7 +148,7 @@ impl Added {
             }
             _ => Err(CcmError::Request(format!(
                 "{}: its ids fit several parts of the data set; name recordings by container and \
-                 sequence",
+                 sequence, or give a data folder without the other parts",
                 self.path.display()
             ))),
         }

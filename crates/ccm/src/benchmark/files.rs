@@ -180,9 +180,11 @@ fn write_submissions(out: &Path, name: &str, pairs: &[(&Target, &Estimate)]) -> 
     };
     for (format, suffix) in [(Format::Y2020, ""), (Format::Y2022, "-2022")] {
         let keys: Option<Vec<RowKey>> = pairs.iter().map(|(t, _)| key(format, t)).collect();
-        let Some(keys) = keys else { continue };
+        let Some(mut keys) = keys else { continue };
         let predictions: Vec<_> =
             keys.iter().zip(pairs).map(|(key, (_, e))| e.prediction(*key)).collect();
+        // By container and sequence, or by id, ascending: official scripts pair rows by position.
+        keys.sort_unstable();
         let path = out.join("submissions").join(format!("{name}{suffix}.csv"));
         Submission::write(&path, format, &predictions, &keys)?;
     }

@@ -34,7 +34,7 @@ use corsmal_models::pipeline::{Pipeline, PipelineSpec};
 use corsmal_report::Report;
 use rayon::prelude::*;
 
-use crate::capacity::require_own_tables;
+use crate::capacity::{require_own_tables, without_tables};
 use crate::dataset::{Container, DataSet, Subset};
 use crate::error::{CcmError, Result};
 use baselines::BaselineResult;
@@ -153,11 +153,19 @@ pub fn run(
         tables.map(|(table, of)| Ok((table.place(&rows)?, of.own))).collect::<Result<Vec<_>>>()?;
     let given = added.iter().chain(capacities.iter().map(|(table, _)| table));
     for nowhere in given.filter(|a| !a.is_any()) {
-        progress(&format!("{}: has no recording of this data set", nowhere.name));
+        progress(&format!("warning: {}: has no recording of this data set", nowhere.name));
     }
     let mut cautions: Vec<String> =
         options.capacities.iter().filter_map(CapacityTable::caution).collect();
     cautions.iter().for_each(|caution| progress(caution));
+    if let Some(without) = without_tables(&set.recordings, options.detections.as_deref()) {
+        progress(&format!("warning: {without}"));
+        cautions.push(format!("{without}."));
+    }
+    for caution in rows.tests.iter().filter_map(results::TestPart::unscored) {
+        progress(&format!("warning: {caution}"));
+        cautions.push(caution);
+    }
     let estimating = added.iter().filter(|a| a.has_capacities());
     for table in estimating.chain(capacities.iter().map(|(table, _)| table)) {
         if let Some(caution) = table.unmeasured() {

@@ -25,6 +25,29 @@ pub(super) struct TestPart {
     pub(super) rows: Vec<Target>,
 }
 
+impl TestPart {
+    /// Whether all its recordings have labels, without which it has no scores.
+    pub(super) fn is_labelled(&self) -> bool {
+        self.rows.iter().all(|target| target.filling.is_some())
+    }
+
+    /// Why it has no scores, or none of capacity and mass, though some of its recordings have labels; in words.
+    pub(super) fn unscored(&self) -> Option<String> {
+        let (name, all) = (self.subset.name(), self.rows.len());
+        let labelled = self.rows.iter().filter(|target| target.filling.is_some()).count();
+        if (1..all).contains(&labelled) {
+            return Some(format!(
+                "{name}: {labelled} of {all} recordings have labels, so it is not scored."
+            ));
+        }
+        let annotated = |t: &&Target| t.annotation.as_ref().is_some_and(|a| a.capacity_ml > 0.0);
+        let known = self.rows.iter().filter(annotated).count();
+        (1..all).contains(&known).then(|| {
+            format!("{name}: {known} of {all} recordings have an annotated capacity, so neither capacity nor mass is scored.")
+        })
+    }
+}
+
 /// The recordings of a data set by what they are used for.
 pub(super) struct Rows {
     /// Labelled recordings of containers 1 to 9, in the order of the 2020 scripts.

@@ -54,6 +54,23 @@ pub(crate) fn require_own_tables(
     )))
 }
 
+/// Recordings without a table of detections in a folder that has some, in words.
+pub fn without_tables(recordings: &[Recording], detections: Option<&Path>) -> Option<String> {
+    let folder = detections?;
+    let is_without =
+        |recording: &&Recording| matches!(Views::of(recording, detections).table(), Ok(None));
+    let without: Vec<&Recording> = recordings.iter().filter(is_without).collect();
+    // Where all are, it is refused.
+    let first = without.first().filter(|_| without.len() < recordings.len())?;
+    Some(format!(
+        "{}: {} of {} recordings have no table of detections; the first would be {}",
+        folder.display(),
+        without.len(),
+        recordings.len(),
+        Views::of(first, detections).table_in(folder).display()
+    ))
+}
+
 /// Recordings whose pictures come from videos with B-frames, in words: what the decoder makes of these may be wrong.
 pub fn doubtful_colours(recordings: &[Recording]) -> Option<String> {
     let doubtful = |recording: &&Recording| {

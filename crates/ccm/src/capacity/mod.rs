@@ -26,6 +26,7 @@ use crate::error::{CcmError, Result};
 use crate::submission::RowKey;
 
 pub(crate) use checks::require_own_tables;
+pub use checks::without_tables;
 pub use checks::{doubtful_colours, require_colours};
 pub use colours::{Colours, Reader};
 pub use combine::combine_files;

@@ -33,6 +33,8 @@ pub struct Views {
     detections: Option<PathBuf>,
     /// Its folder among tables of several: the container's number or, where it is not known, the part.
     group: String,
+    /// The part, where the container is known: a test part may have had no labels when tables were made.
+    part: Option<String>,
     /// Frames by kind and view, once they have been asked for.
     frames: [[Listing; 4]; 3],
     /// The video of each view, once it has been asked for.
@@ -59,14 +61,19 @@ impl Views {
                 Some(container) => container.number().to_string(),
                 None => recording.part.name().replace(' ', "-"),
             },
+            part: recording.container.map(|_| recording.part.name().replace(' ', "-")),
             frames: Default::default(),
             videos: Default::default(),
         }
     }
 
-    /// Where its table of detections is among those in a folder.
+    /// Where its table of detections is, or will be, among those in a folder.
     pub fn table_in(&self, folder: &Path) -> PathBuf {
-        folder.join(&self.group).join(format!("{}.json", self.stem))
+        let name = format!("{}.json", self.stem);
+        let is_there = |table: &PathBuf| table.is_file() || table.with_extension("csv").is_file();
+        let own = folder.join(&self.group).join(&name);
+        let of_part = self.part.as_ref().map(|part| folder.join(part).join(&name));
+        of_part.filter(|table| is_there(table) && !is_there(&own)).unwrap_or(own)
     }
 
     /// The colour camera of a view, 1 to 4.
@@ -164,14 +171,16 @@ impl Views {
     pub(super) fn table(&self) -> Result<Option<PathBuf>, Problem> {
         let own = self.base.join("detections");
         let folder = self.detections.as_ref().unwrap_or(&own);
-        let mut folders = vec![folder.clone()];
+        let mut folders = vec![vec![folder.clone()]];
         if self.detections.is_some() {
-            folders.insert(0, folder.join(&self.group));
+            let groups = std::iter::once(&self.group).chain(&self.part);
+            folders.insert(0, groups.map(|group| folder.join(group)).collect());
         }
-        for folder in folders {
-            let tables =
-                ["csv", "json"].map(|extension| folder.join(format!("{}.{extension}", self.stem)));
-            let mut there = tables.into_iter().filter(|path| path.is_file());
+        for folders in folders {
+            let tables = folders.iter().flat_map(|folder| {
+                ["csv", "json"].map(|extension| folder.join(format!("{}.{extension}", self.stem)))
+            });
+            let mut there = tables.filter(|path| path.is_file());
             match (there.next(), there.next()) {
                 (Some(one), Some(other)) => {
                     return Err(Problem::Damaged(format!(

@@ -146,10 +146,36 @@ fn added_files_cover_a_part_or_are_refused() {
 fn an_added_file_about_nothing_here_is_said() {
     let adding = Adding::new();
     let (report, said) = adding.run(&["13,0,1,1,-1".into(), "13,1,1,1,-1".into()]);
-    assert_eq!(said, ["theirs: has no recording of this data set"]);
+    assert_eq!(said, ["warning: theirs: has no recording of this data set"]);
     let report = report.unwrap();
     let notes = report.sections.iter().find(|s| s.id == "notes").unwrap();
     assert!(notes.text.last().unwrap().contains("predictions of theirs"), "{:?}", notes.text);
+}
+
+/// Its methods left the tables without a word, but for scores of what has labels by scenario.
+#[test]
+fn a_test_part_with_few_labels_is_said_not_to_be_scored() {
+    let adding = Adding::new();
+    let data = adding.dir.path().join("data");
+    let test = data.join("test_pub/audio");
+    std::fs::create_dir_all(&test).unwrap();
+    let from = data.join("train/1/audio/s0_fi1_fu1_b1_l0_audio.wav");
+    for id in 0..3 {
+        std::fs::copy(&from, test.join(format!("{id:06}.wav"))).unwrap();
+    }
+    let table = std::fs::read_to_string(data.join("ccm_train_annotation.csv")).unwrap();
+    let (header, row) = (table.lines().next().unwrap(), table.lines().nth(1).unwrap());
+    let (_, about) = row.split_once(",1,").unwrap();
+    let rows = |ids: u32| (0..ids).map(|id| format!("{id},10,{about}\n")).collect::<String>();
+    let annotations = data.join("test_pub/ccm_test_pub_annotation.csv");
+    let lines: Vec<String> = adding.lines();
+    for (labelled, expected) in [(2, true), (3, false)] {
+        std::fs::write(&annotations, format!("{header}\n{}", rows(labelled))).unwrap();
+        let (report, said) = adding.run(&lines);
+        report.unwrap();
+        let told = "warning: public test: 2 of 3 recordings have labels, so it is not scored.";
+        assert_eq!(said.iter().any(|line| line == told), expected, "{said:?}");
+    }
 }
 
 /// Ids start at 0 in every part.
@@ -187,6 +213,10 @@ fn a_file_of_ids_is_about_the_part_that_it_fits() {
     };
     assert!(submission(684).unwrap(), "training");
     assert!(!submission(228).map_err(|e| e.to_string()).unwrap(), "public test, without labels");
+    // All that there is of the part, though the official one has more.
+    assert!(!submission(3).map_err(|e| e.to_string()).unwrap(), "public test, without labels");
+    let error = submission(5).unwrap_err().to_string();
+    assert!(error.contains("3 of its 5 ids are those of the public test recordings"), "{error}");
     let error = submission(60).unwrap_err().to_string();
     assert!(error.contains("its ids fit several parts"), "{error}");
 }

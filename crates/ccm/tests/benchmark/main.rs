@@ -258,6 +258,35 @@ fn flat_test_recordings_are_submitted_by_id() {
     assert!(!out.join("submissions/zcr-mfcc-knn-corrected-public-test.csv").exists());
 }
 
+/// The official scripts pair rows by position; ids are spread over the containers.
+#[test]
+fn submissions_by_id_are_in_the_order_of_ids() {
+    let dir = tempfile::tempdir().unwrap();
+    let (data, out) = (dir.path().join("data"), dir.path().join("report"));
+    synth::generate(&data, Size::Small, 7).unwrap();
+    let path = data.join("ccm_train_annotation.csv");
+    let table = std::fs::read_to_string(&path).unwrap();
+    let (header, rows) = table.split_once('\n').unwrap();
+    let mut rows: Vec<&str> = rows.lines().map(|row| row.split_once(',').unwrap().1).collect();
+    rows.reverse();
+    let rows: Vec<String> =
+        rows.iter().enumerate().map(|(id, row)| format!("{id},{row}")).collect();
+    std::fs::write(&path, format!("{header}\n{}\n", rows.join("\n"))).unwrap();
+    run(&options(&data, &out, Baseline::all().into_iter().take(1).collect())).unwrap();
+    let read = |suffix: &str| {
+        let name = format!("submissions/zcr-mfcc-knn-corrected-held-out{suffix}.csv");
+        std::fs::read_to_string(out.join(name)).unwrap()
+    };
+    let ids = |table: String| -> Vec<String> {
+        table.lines().skip(1).map(|row| row.split(',').next().unwrap().to_owned()).collect()
+    };
+    let expected: Vec<String> = (0..rows.len()).map(|id| id.to_string()).collect();
+    assert_eq!(ids(read("-2022")), expected);
+    // Of 2020 by container and sequence, as before.
+    let containers: Vec<u8> = ids(read("")).iter().map(|id| id.parse().unwrap()).collect();
+    assert!(containers.is_sorted() && containers.len() == rows.len(), "{containers:?}");
+}
+
 /// The published code fits components to the test recordings: of one recording there are none.
 #[test]
 fn a_test_part_of_one_recording_is_classified() {

@@ -114,7 +114,7 @@ enum CapacitySource {
 fn capacity_source(text: &str) -> Result<CapacitySource, String> {
     let learning = |name: &str| {
         let all = [Method::M2, Method::M3, Method::Fused];
-        all.into_iter().find(|method| method.name() == name)
+        all.into_iter().find(|method| method.name().eq_ignore_ascii_case(name))
     };
     match text {
         "m4" => Ok(CapacitySource::Run(Method::M4, None)),

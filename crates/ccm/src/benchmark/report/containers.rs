@@ -5,7 +5,7 @@ use corsmal_report::{Cell, Figure, Row, Section, Source, Table};
 use ndarray::Array2;
 
 use crate::benchmark::method::{Method, Part, of_task};
-use crate::benchmark::results::{Rows, Target};
+use crate::benchmark::results::{Rows, Target, TestPart};
 use crate::dataset::Subset;
 use crate::error::Result;
 use crate::paper::{self, Task};
@@ -34,11 +34,21 @@ pub(super) fn section(rows: &Rows, methods: &[Method], seed: u64) -> Result<Sect
             };
             for method in methods.iter().filter(|m| m.protocol != "published").filter(of_task_here)
             {
+                let is_labelled = |part: &&Part| match part {
+                    Part::Training => true,
+                    Part::Test(subset) => {
+                        rows.tests.iter().any(|test| test.subset == *subset && test.is_labelled())
+                    }
+                    Part::Combined => rows.tests.iter().all(TestPart::is_labelled),
+                };
                 // One test part alone still has scores by container.
                 let figure = |keep: &dyn Fn(&Target) -> bool| {
                     let whole = [part, Part::Test(Subset::Public), Part::Test(Subset::Private)];
                     let parts = if matches!(part, Part::Training) { &whole[..1] } else { &whole };
-                    let scores = parts.iter().find_map(|p| method.scores(rows, *p, seed, keep));
+                    let scores = parts
+                        .iter()
+                        .filter(is_labelled)
+                        .find_map(|p| method.scores(rows, *p, seed, keep));
                     Cell::score(scores.and_then(|s| of_task(task, &s)))
                 };
                 let scenario =

@@ -13,6 +13,8 @@ use std::process::ExitCode;
 use clap::{Subcommand, ValueEnum};
 use corsmal_ccm::CcmError;
 use corsmal_ccm::capacity::{self, CapacityModel, CapacityOptions, Method, Row};
+use corsmal_ccm::dataset::DataSet;
+use corsmal_ccm::submission::RowKey;
 use corsmal_vision::cuboid::Outliers;
 use serde_json::json;
 
@@ -164,6 +166,11 @@ fn estimate(args: Estimate) -> Result<ExitCode, Failure> {
         };
     }
     read_learned(&mut options, args.model.as_deref(), args.weights.as_deref())?;
+    if let (Some(folder), Ok(set)) = (&options.detections, DataSet::open(&options.data))
+        && let Some(without) = capacity::without_tables(&set.recordings, Some(folder))
+    {
+        eprintln!("warning: {without}");
+    }
     let rows = match capacity::run(&options, &|_, _| {}, crate::interrupt::flag()) {
         Err(error @ CcmError::Interrupted) => {
             eprintln!("{error}");
@@ -236,7 +243,14 @@ fn read_network(
 
 fn first_failure(rows: &[Row]) -> Option<(String, String)> {
     rows.iter().find_map(|row| match &row.estimate {
-        Err(capacity::Problem::Damaged(reason)) => Some((row.key.to_string(), reason.clone())),
+        Err(capacity::Problem::Damaged(reason)) => {
+            // Ids begin at 0 in every part.
+            let name = match row.key {
+                RowKey::Id(_) => format!("{} of the {} part", row.key, row.part.name()),
+                RowKey::Sequence(..) => row.key.to_string(),
+            };
+            Some((name, reason.clone()))
+        }
         _ => None,
     })
 }

@@ -78,7 +78,16 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
         for prediction in &mut predictions {
             prediction.key = names.of_format(prediction.key).ok_or_else(|| {
                 let path = names.path.display();
-                Failure::new(format!("{path}: has no line for {}", prediction.key))
+                Failure::new(match names.names.is_empty() {
+                    true => format!(
+                        "{path}: has no sequence numbers beside its ids, so rows cannot be named for --format {}",
+                        match format {
+                            submission::Format::Y2020 => 2020,
+                            submission::Format::Y2022 => 2022,
+                        }
+                    ),
+                    false => format!("{path}: has no line for {}", prediction.key),
+                })
             })?;
         }
     }
