@@ -435,7 +435,7 @@ def train_network(
     checkpoints: str | None,
     progress: Any,
     jobs: int | None,
-) -> tuple[TrainedNetwork, str | None, list[tuple[str, str]]]: ...
+) -> tuple[TrainedNetwork, list[str], list[tuple[str, str]]]: ...
 def cross_validate_network(
     name: str,
     rows: list[tuple[str, str, str | None]],

@@ -281,6 +281,9 @@ def score(
         raise ParameterError(f"reject must be a probability from 0 to 1, not {reject}")
     if labels is not None and os.fspath(labels) == FOLDERS and target is None:
         target = "class"
+    count = whole("resamples", resamples, 1_000_001)
+    if count == 0:
+        raise ParameterError("resamples must be at least 1, not 0")
     text = _core.score(
         existing(predictions),
         _labels(labels, id_column, target or "class"),
@@ -288,7 +291,7 @@ def score(
         groups,
         float(reject),
         bool(numeric),
-        whole("resamples", resamples, 1_000_001),
+        count,
         seed_of(seed),
     )
     report = json.loads(text)

@@ -141,11 +141,11 @@ def train(
     ['rice', 'water']
     """
     rows, kind = _rows(recordings, y, groups)
-    network, doubt, left_out = _core.train_network(
+    network, odd, left_out = _core.train_network(
         name, rows, kind, _recipe(name, recipe), _folder(checkpoints), progress, jobs_of(jobs)
     )
-    if doubt is not None:
-        warn(doubt)
+    for warning in odd:
+        warn(warning)
     _tell_left_out(left_out, len(rows))
     return TrainedNetwork(network)
 
@@ -347,9 +347,12 @@ def _rows(
             )
         if values is not None:
             check_named(what, given, values, "nets")
+    kind = label_kind(labels)
     names = [str(label) for label in labels.tolist()]
+    if kind == "f" and all(float(label).is_integer() for label in labels.tolist()):
+        names = [str(int(label)) for label in labels.tolist()]  # "1.0" is no name of a class
     parts = [None] * len(paths) if of_group is None else [str(g) for g in of_group.tolist()]
-    return list(zip(paths, names, parts, strict=True)), label_kind(labels)
+    return list(zip(paths, names, parts, strict=True)), kind
 
 
 def _recipe(name: str, recipe: Mapping[str, Any] | None) -> str:

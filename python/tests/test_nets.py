@@ -239,6 +239,11 @@ def test_a_network_learns_from_recordings_and_hears_them(tmp_path: Path) -> None
         with pytest.raises(ModelError, match=r"tone\.safetensors holds a network: use nets\.load"):
             load(tmp_path / "tone.safetensors")
 
+    # Decimals as pandas makes them of whole numbers, and groups that nothing asks for.
+    with pytest.warns(UserWarning, match="groups affects only"):
+        decimal = nets.train("m1", paths, np.array(y, float), groups=y, recipe={"epochs": 1})
+    assert decimal.classes_.tolist() == [1.0, 2.0]
+
     groups = ["a", "b", "c"] * 2
     recipe = {"epochs": 20}
     result = nets.cross_validate("m1", paths, y, groups=groups, recipe=recipe)

@@ -190,6 +190,13 @@ def test_files_are_fused_and_compared(tmp_path: Path) -> None:
     assert grouped.report["bootstrap_rows"]["low"] > 0.05
     with pytest.raises(ParameterError, match='no column "speaker" of groups'):
         corsmal_feat.compare_predictions(one, two, groups="speaker")
+    lines = [f"{w},{w // 20},x,{'xy'[w % 2]}\n" for w in range(40)]
+    two.write_text("id,fold,true,predicted\n" + "".join(lines))
+    one.write_text("id,true,predicted\n" + "".join(f"{w},x,x\n" for w in range(40)))
+    with pytest.warns(UserWarning, match=r"two\.csv has folds and .*one\.csv has none"):
+        corsmal_feat.compare_predictions(one, two, resamples=50)
+    with pytest.raises(ParameterError, match="resamples must be at least 1"):
+        corsmal_feat.score(one, resamples=0)
     predictions(one, seed=1)
     two.write_text(one.read_text())
     fused = corsmal_feat.fuse([one, two], weights=[1, 2])

@@ -162,6 +162,9 @@ impl Request<'_> {
         };
         let weights = self.weights()?;
         let training = self.training(&target, recipe, weights.as_ref(), device)?;
+        if let Some(unheeded) = training.unheeded() {
+            eprintln!("warning: {unheeded}");
+        }
         let progress = |told: Progress<'_>| tell(examples.definition.name, told, self.quiet, F1);
         training.train(&examples, files, progress).map_err(|e| self.stopped(e))
     }

@@ -7,7 +7,7 @@ use std::str::FromStr;
 use crate::copies;
 use crate::dataset::{LabelledTable, Result};
 use crate::error::ModelError;
-use crate::groups;
+use crate::groups::{self, RECORDING};
 use crate::labels::{Labels, alike, is_missing, measured};
 use crate::splits::{self, Fold};
 use crate::targets::Classes;
@@ -15,9 +15,6 @@ use crate::words::count;
 
 /// Inner folds of a choice, and folds without groups, unless there are fewer groups.
 const FOLDS: usize = 5;
-
-/// The recordings of windows, which no folds split unless the user names other groups.
-const RECORDING: &str = "recording";
 
 /// What to do with rows without a group, besides.
 const ELSE: &str = "; --cv 5 without --groups needs none";
@@ -118,10 +115,13 @@ impl Folds {
             None => CvPlan::K(FOLDS),
         };
         let plan = plan.unwrap_or(&default);
-        let of_windows = !matches!(plan, CvPlan::Lists(_))
-            && groups::are_several(table, RECORDING)
-            && !groups::is_target(table, RECORDING, target);
-        let groups = groups.or(of_windows.then_some(RECORDING));
+        let named = groups;
+        let recordings =
+            groups::recordings(table, target).filter(|_| !matches!(plan, CvPlan::Lists(_)));
+        let groups = named.or(match plan {
+            CvPlan::Group(column) => Some(column),
+            _ => recordings,
+        });
         let column = match plan {
             CvPlan::Group(column) | CvPlan::Fold(column) => Some(column.as_str()),
             CvPlan::K(_) | CvPlan::Lists(_) => groups,
@@ -147,11 +147,15 @@ impl Folds {
         let kept = match groups {
             Some(groups) if column != Some(groups) => {
                 let values = groups::values(table, groups, ELSE)?;
-                refuse_split(&outer, &values, (plan, groups))?;
+                refuse_split(&outer, &values, (plan, groups), named.is_some())?;
                 Some(values)
             }
             _ => parts,
         };
+        if let (None, CvPlan::Group(_), Some(recordings)) = (named, plan, recordings) {
+            let values = groups::values(table, recordings, ELSE)?;
+            refuse_split(&outer, &values, (plan, recordings), false)?;
+        }
         let one = kept.is_none()
             && table.ids.len() > 1
             && table.column(RECORDING).is_ok_and(|values| Labels::of(&values).0.len() == 1);
@@ -160,7 +164,7 @@ impl Folds {
         if one {
             odd.push(ONE_RECORDING.into());
         }
-        if let (CvPlan::K(_), None) = (plan, column) {
+        if let (CvPlan::K(_), None) = (plan, named) {
             let is_split = |column: &&str| {
                 let values = table.column(column);
                 !groups::is_target(table, column, target)
@@ -176,6 +180,34 @@ impl Folds {
         let are_folds = matches!(plan, CvPlan::Fold(_)) && groups.is_none();
         let names = labels.names().to_vec();
         Ok(Self { description, outer, groups: kept, odd, are_folds, names, seed })
+    }
+
+    /// Inner folds alone, for choosing parameters on all rows.
+    ///
+    /// # Errors
+    /// Columns that are not there, rows without a group.
+    pub fn for_choice(
+        table: &LabelledTable,
+        groups: Option<&str>,
+        (labels, classes): (&Labels, &Classes),
+        seed: u32,
+    ) -> Result<Self> {
+        let target = (labels, classes);
+        let column = groups
+            .or_else(|| groups::usual(table, target))
+            .or_else(|| groups::recordings(table, target));
+        let otherwise = "; without --tune, no groups are needed";
+        let values = column.map(|column| groups::values(table, column, otherwise)).transpose()?;
+        let recordings = groups::recordings(table, target);
+        if let (None, Some(values), Some(recordings)) = (groups, &values, recordings) {
+            let recordings = groups::values(table, recordings, otherwise)?;
+            let held_out = splits::leave_one_group_out(values)?;
+            refuse_split(&held_out, &recordings, (&"inner folds", RECORDING), false)?;
+        }
+        let groups = values;
+        let (outer, odd, names) = (Vec::new(), Vec::new(), labels.names().to_vec());
+        let description = "inner folds".into();
+        Ok(Self { description, outer, groups, odd, are_folds: false, names, seed })
     }
 
     /// What is never split, one name per row; `None` where any row may be held out.
@@ -253,15 +285,24 @@ impl Folds {
     }
 }
 
-/// Refuses folds that hold out a part of a group.
-fn refuse_split(folds: &[Fold], groups: &[String], (plan, column): (&CvPlan, &str)) -> Result<()> {
+/// Refuses folds that hold out a part of a group; `is_named` says that the user chose the column.
+fn refuse_split(
+    folds: &[Fold],
+    groups: &[String],
+    (plan, column): (&dyn fmt::Display, &str),
+    is_named: bool,
+) -> Result<()> {
     let mut fold_of: HashMap<&str, &str> = HashMap::new();
     for fold in folds {
         for &row in &fold.test {
             let other = *fold_of.entry(&groups[row]).or_insert(&fold.name);
             if other != fold.name {
+                let remedy = match is_named {
+                    true => "--groups must not be split",
+                    false => "name the groups with --groups if that is right",
+                };
                 let reason = format!(
-                    "{plan}: {column} {} is in the folds {other} and {}; --groups must not be split",
+                    "{plan}: {column} {} is in the folds {other} and {}; {remedy}",
                     groups[row], fold.name
                 );
                 return Err(ModelError::Folds { reason }.into());
@@ -335,6 +376,37 @@ mod tests {
             assert!(refused.contains(expected), "{plan}: {refused}");
         }
         assert!(folds("2", None).is_ok());
+    }
+
+    /// Windows of recordings: the recordings were the groups, not what contains them.
+    #[test]
+    fn containers_of_windows_are_groups() {
+        let windows = table([
+            ("y", ["a", "b", "a", "b"]),
+            ("recording", ["r1", "r2", "r3", "r4"]),
+            ("container", ["1", "1", "2", "2"]),
+        ]);
+        let (labels, classes) = windows.classes("y").unwrap();
+        let folds = |plan: Option<&CvPlan>, groups| {
+            Folds::new(plan, &windows, groups, (&labels, &classes), 0).unwrap()
+        };
+        let containers = Some(&["1", "1", "2", "2"].map(String::from)[..]);
+        assert_eq!(folds(None, None).dependent(), containers);
+        assert_eq!(folds(Some(&CvPlan::Group("container".into())), None).dependent(), containers);
+        assert_eq!(folds(None, Some("container")).dependent(), containers);
+        let choice = Folds::for_choice(&windows, None, (&labels, &classes), 0).unwrap();
+        assert_eq!(choice.groups(), containers);
+        let said = folds(Some(&CvPlan::K(2)), None).warnings(&classes).join(" ");
+        assert!(said.contains("--groups container"), "{said}");
+        // A recording that belongs to two groups is split by them.
+        let odd = table([
+            ("y", ["a", "b", "a", "b"]),
+            ("recording", ["r1", "r1", "r2", "r2"]),
+            ("container", ["1", "2", "2", "1"]),
+        ]);
+        let (labels, classes) = odd.classes("y").unwrap();
+        let split = Folds::new(None, &odd, None, (&labels, &classes), 0).unwrap_err().to_string();
+        assert!(split.contains("recording r1 is in the folds 1 and 2"), "{split}");
     }
 
     #[test]

@@ -9,10 +9,22 @@ use crate::words::count;
 /// Columns that are groups unless the user says otherwise.
 pub(crate) const USUAL: [&str; 2] = ["container", "group"];
 
+/// The recordings of windows, which no folds split unless the user names other groups.
+pub(crate) const RECORDING: &str = "recording";
+
 /// The first usual column of groups: it has several, and is not the target.
 pub fn usual(table: &LabelledTable, target: (&Labels, &Classes)) -> Option<&'static str> {
     let mut columns = USUAL.into_iter();
     columns.find(|column| are_several(table, column) && !is_target(table, column, target))
+}
+
+/// The column of recordings that rows are parts of, such as windows: there are several, and it is not the target.
+pub(crate) fn recordings(
+    table: &LabelledTable,
+    target: (&Labels, &Classes),
+) -> Option<&'static str> {
+    let found = are_several(table, RECORDING) && !is_target(table, RECORDING, target);
+    found.then_some(RECORDING)
 }
 
 /// Whether a column has several values.

@@ -122,3 +122,18 @@ fn faults_of_joint_classes_name_the_file_of_their_part() {
         assert!(message.starts_with(&format!("{file}: {what}")), "{message}");
     }
 }
+
+/// Named ids were a label as well, and those of Parquet were not found.
+#[test]
+fn named_ids_are_no_labels() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.npz");
+    let mut npz = NpzWriter::create(&path, Compression::Stored).unwrap();
+    npz.floats("X", &[3, 1], &[0.0, 1.0, 2.0]).unwrap();
+    npz.strings("ids", &["a", "b", "c"]).unwrap();
+    npz.finish().unwrap();
+    let named = MemberNames { ids: Some("ids".into()), ..MemberNames::default() };
+    let table = LabelledTable::read(&path, &named).unwrap();
+    assert_eq!(table.ids, ["a", "b", "c"]);
+    assert!(table.column("ids").is_err());
+}

@@ -119,7 +119,7 @@ pub(crate) fn train_network(
     checkpoints: Option<PathBuf>,
     progress: Option<Py<PyAny>>,
     jobs: Option<usize>,
-) -> PyResult<(PyTrainedNetwork, Option<String>, Failed)> {
+) -> PyResult<(PyTrainedNetwork, Vec<String>, Failed)> {
     let training = training(&rows, recipe, checkpoints.as_deref())?;
     let (examples, left_out) = examples(py, name, &rows, jobs)?;
     let mut teller = Teller::new(progress);
@@ -129,7 +129,8 @@ pub(crate) fn train_network(
     teller.end()?;
     let mut model = trained.map_err(error)?.model;
     model.header.provenance["label_kind"] = kind.into();
-    Ok((PyTrainedNetwork(model), examples.doubt(), left_out))
+    let odd = training.unheeded().map(str::to_owned).into_iter().chain(examples.doubt());
+    Ok((PyTrainedNetwork(model), odd.collect(), left_out))
 }
 
 /// Scores of a network on recordings that it was not trained on: the report as JSON, the predictions

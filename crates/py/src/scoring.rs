@@ -85,11 +85,18 @@ pub(crate) fn cross_validate(
     let source = labels.source();
     compute(py, || {
         let mut table = LabelledTable::read(&features, &MemberNames::default())?;
-        if let Some(source) = &source {
-            table.add_labels(source)?;
-        }
+        let replaced = source.as_ref().map(|source| table.add_labels(source)).transpose()?;
+        let replaced = replaced.into_iter().flatten();
+        let mut odd: Vec<String> = replaced
+            .map(|column| {
+                format!("the column {column} of the features is replaced by that of --labels")
+            })
+            .collect();
+        odd.extend(table.unmatched.take());
         table.check()?;
-        let validation = validate(&table, target, candidates, (plan.as_ref(), groups), seed)?;
+        odd.extend(table.doubts());
+        let mut validation = validate(&table, target, candidates, (plan.as_ref(), groups), seed)?;
+        validation.warnings.splice(0..0, odd);
         let held_out = validation.predictions(&table.ids, Path::new("the held-out predictions"));
         Ok((validation, held_out))
     })?

@@ -152,6 +152,15 @@ impl Validated {
 }
 
 impl Training<'_> {
+    /// What a training would not heed, in words.
+    pub fn unheeded(&self) -> Option<&'static str> {
+        let is_idle = self.groups.is_some() && self.recipe.select != Select::Validation;
+        is_idle.then_some(
+            "--groups affects only a training whose recipe has select=validation, which holds a group out; all rows are \
+             used for training",
+        )
+    }
+
     /// Trains on all items. `files` says in the model where they came from; `progress` ends the
     /// training by returning false.
     ///

@@ -1,17 +1,14 @@
 //! Labelled features.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use corsmal_files::identity;
-use corsmal_files::outcome::Outcome;
 use corsmal_models::dataset::{LabelSource, LabelledTable, MemberNames};
 use corsmal_models::predictions::NO_TARGETS;
 use serde_json::{Value, json};
 
 use super::network::CLASSIFIER;
 use crate::failure::Failure;
-use crate::plural::plural;
 
 /// What --labels says for class folders.
 const FOLDERS: &str = "folders";
@@ -97,28 +94,6 @@ impl LabelArgs {
     }
 }
 
-/// Columns that another program added to statistics of ours, which are taken for features.
-fn strange(table: &LabelledTable) -> Option<String> {
-    let (ours, others): (Vec<&str>, Vec<&str>) =
-        table.feature_names.iter().map(String::as_str).partition(|name| name.contains(['[', '.']));
-    (table.config.is_null() && !ours.is_empty() && !others.is_empty()).then(|| {
-        format!("{} of decimal numbers, used as features: write labels as text", others.join(", "))
-    })
-}
-
-/// How many recordings of a run have no features, and why.
-fn left_out(outcomes: &[Outcome]) -> Option<String> {
-    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
-    for outcome in outcomes.iter().filter(|outcome| !outcome.status.has_features()) {
-        *counts.entry(outcome.status.name()).or_default() += 1;
-    }
-    let total = counts.values().sum::<usize>();
-    let each: Vec<String> = counts.iter().map(|(status, n)| format!("{n} {status}")).collect();
-    let recordings = plural(outcomes.len(), "recording");
-    let have = if total == 1 { "has no features and is" } else { "have no features and are" };
-    (total > 0).then(|| format!("{total} of {recordings} {have} left out ({})", each.join(", ")))
-}
-
 fn is_like_folders(path: &Path) -> bool {
     corsmal_names::closest(&path.to_string_lossy(), [FOLDERS]).is_some()
 }
@@ -176,29 +151,9 @@ impl DatasetArgs {
     pub fn load(&self) -> Result<(LabelledTable, String), Failure> {
         let mut table = LabelledTable::read(self.path(), &self.members.names())?;
         let target = self.label(&mut table, None)?;
-        let constant = table.check()?;
-        if let Some(strange) = strange(&table) {
-            eprintln!("warning: {}: {strange}", self.path().display());
-        }
-        if let Some(left_out) = left_out(&table.outcomes) {
-            eprintln!("warning: {}: {left_out}", self.path().display());
-        }
-        let formats = table.trained_on();
-        if let Some(mixed) = formats.as_ref().and_then(|t| t.mixed_rates(&table.config)) {
-            eprintln!(
-                "warning: {}: {mixed}; extract with --set signal.sample_rate={} to resample them",
-                self.path().display(),
-                usual_rate(&table)
-            );
-        }
-        if let Some(&first) = constant.first() {
-            eprintln!(
-                "warning: {}: {} of {} features have the same value in all rows, the first is {}",
-                self.path().display(),
-                constant.len(),
-                table.x.ncols(),
-                table.feature_name(first)
-            );
+        table.check()?;
+        for doubt in table.doubts() {
+            eprintln!("warning: {}: {doubt}", self.path().display());
         }
         Ok((table, target))
     }
@@ -271,18 +226,4 @@ impl DatasetArgs {
             "labels": self.labels.file().map(file).transpose()?,
         }))
     }
-}
-
-/// The sample rate of most recordings in Hz, 0 where none is known.
-fn usual_rate(table: &LabelledTable) -> u32 {
-    let mut counts: Vec<(u32, usize)> = Vec::new();
-    for rate in table.outcomes.iter().filter_map(|outcome| outcome.sample_rate) {
-        match counts.iter_mut().find(|(known, _)| *known == rate) {
-            Some((_, count)) => *count += 1,
-            None => counts.push((rate, 1)),
-        }
-    }
-    // The first of those that are equally many, as `extract` has it.
-    counts.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-    counts.first().map_or(0, |(rate, _)| *rate)
 }

@@ -70,25 +70,6 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     for warning in &report.warnings {
         eprintln!("warning: {warning}");
     }
-    let has_folds = |table: &PredictionTable| table.columns.iter().any(|name| name == "fold");
-    if has_folds(&first) != has_folds(&second) {
-        let (with, without) = match has_folds(&first) {
-            true => (&args.first, &args.second),
-            false => (&args.second, &args.first),
-        };
-        eprintln!(
-            "warning: {} has folds and {} has none: no folds are drawn, and the comparison is unfair \
-             if a classifier was trained on the rows that it predicts",
-            with.display(),
-            without.display()
-        );
-    } else if report.folds_differ {
-        eprintln!(
-            "warning: {}: its folds are not those of {}, so none are drawn",
-            args.second.display(),
-            args.first.display()
-        );
-    }
     if args.json {
         println!("{}", serde_json::to_string_pretty(&report)?);
         return Ok(ExitCode::SUCCESS);

@@ -98,7 +98,7 @@ fn train(args: &Args) -> Result<ExitCode, Failure> {
     }
     if candidates.len() > 1 {
         let (seed, named) = (args.pipeline.seed(), args.dataset.groups.as_deref());
-        let folds = Folds::new(None, &table, named, (&labels, &classes), seed)?;
+        let folds = Folds::for_choice(&table, named, (&labels, &classes), seed)?;
         let data = Data { dataset: &dataset, merge: None };
         let all: Vec<usize> = (0..classes.len()).collect();
         let (best, scores) = choose(&data, &all, &candidates, |rows| folds.inner(rows, &classes))?;

@@ -1,6 +1,7 @@
 //! Options that would have no effect are refused, not passed over.
 
-use crate::command::refused;
+use crate::command::{done, refused, text};
+use crate::models::small_table;
 
 /// clap asks for no option that another one excludes: these were accepted.
 #[test]
@@ -54,4 +55,35 @@ fn what_a_form_has_no_place_for_is_refused() {
     std::fs::write(&csv, "id,true,predicted\na,1.5,1\nb,2,2.5\n").unwrap();
     let said = refused(&["score", csv.to_str().unwrap(), "--reject", "0.6"]);
     assert!(said.contains("--reject is for classes"), "{said}");
+}
+
+/// All predictions were kept, as if they were certain.
+#[test]
+fn predictions_without_probabilities_cannot_be_rejected() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let (file, model) = (at("x.npz"), at("m"));
+    small_table(&file, |_, _| {});
+    for set in ["probability=false", "solver=linfa"] {
+        let learn = ["train", text(&file), "--target", "type", "--classifier", "svm", "--set", set];
+        done(&[&learn[..], &["-o", text(&model), "-q", "--overwrite"]].concat());
+        let classify = ["classify", "-m", text(&model), "--features", text(&file)];
+        done(&classify);
+        let said = refused(&[&classify[..], &["--reject", "0.5"]].concat());
+        assert!(said.contains("--reject: this svm has no probabilities"), "{said}");
+    }
+    let said =
+        refused(&["classify", "-m", text(&model), "--features", text(&file), "--vote", "mean"]);
+    assert!(said.contains("--window, which takes recordings"), "{said}");
+}
+
+/// They were refused for outer folds that no choice of parameters needs.
+#[test]
+fn parameters_are_chosen_with_few_rows_of_a_class() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let (file, model) = (at("x.npz"), at("m"));
+    small_table(&file, |_, labels| labels[..3].fill("z".into()));
+    let learn = ["train", text(&file), "--target", "type", "--classifier", "knn"];
+    done(&[&learn[..], &["--tune", "k=1,3", "-o", text(&model), "-q"]].concat());
 }

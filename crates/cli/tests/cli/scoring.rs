@@ -341,3 +341,34 @@ fn a_bad_number_is_said_to_be_true_or_an_estimate() {
     let message = refused(&["score", text(&file), "--numeric"]);
     assert!(message.contains("no row has an estimate (-1 stands for none)"), "{message}");
 }
+
+/// One class that is called like a decimal number made numbers of all.
+#[test]
+fn a_class_may_be_called_like_a_number() {
+    let folder = tempfile::tempdir().unwrap();
+    let lines = "id,true,predicted\n1,dog,dog\n2,1e5,1e5\n3,cat,dog\n";
+    let file = written(folder.path(), "p.csv", lines);
+    let report = done(&["score", text(&file), "--json", "--resamples", "50"]);
+    let report: Value = serde_json::from_str(&report).unwrap();
+    assert_eq!(report["kind"], "classes");
+    // A number that is misspelt is still said.
+    let lines = "id,true,predicted\n1,1.5,1.4\n2,2.5x,2.5\n3,0.5,0.5\n";
+    let file = written(folder.path(), "n.csv", lines);
+    assert!(
+        refused(&["score", text(&file)]).contains("2: the true value \"2.5x\" is not a number")
+    );
+}
+
+/// `fuse` took the probabilities of predictions that `classify --reject` had withheld.
+#[test]
+fn rejected_predictions_stay_rejected() {
+    let folder = tempfile::tempdir().unwrap();
+    let lines = "id,path,predicted,p_a,p_b\n1,1.wav,unknown,0.6,0.4\n2,2.wav,b,0.1,0.9\n";
+    let file = written(folder.path(), "p.csv", lines);
+    let fused = run(&["fuse", text(&file), text(&file), "-o", "-"]);
+    assert_eq!(fused.status.code(), Some(1));
+    let fused = String::from_utf8(fused.stdout).unwrap();
+    let predicted: Vec<&str> =
+        fused.lines().skip(1).map(|line| line.split(',').nth(2).unwrap_or_default()).collect();
+    assert_eq!(predicted, ["", "b"], "{fused}");
+}

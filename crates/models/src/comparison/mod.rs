@@ -257,6 +257,22 @@ pub fn compare(
         }
         (one, other) => one.is_some() != other.is_some(),
     };
+    let paths = [&first.path, &second.path].map(|path| path.display());
+    match (&folds, &others) {
+        (Some(_), Some(_)) if folds_differ => warnings.push(format!(
+            "{}: its folds are not those of {}, so none are drawn",
+            paths[1], paths[0]
+        )),
+        (Some(_), None) | (None, Some(_)) => {
+            let [with, without] = if folds.is_some() { [0, 1] } else { [1, 0] };
+            warnings.push(format!(
+                "{} has folds and {} has none: no folds are drawn, and the comparison is unfair if a classifier \
+                 was trained on the rows that it predicts",
+                paths[with], paths[without]
+            ));
+        }
+        _ => {}
+    }
     let folds = folds.unwrap_or_default();
     let n_folds = Labels::of(&folds).0.len();
     let foldwise = n_folds > 1 && !folds_differ && folds.iter().all(|fold| !fold.is_empty());

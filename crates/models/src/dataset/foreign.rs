@@ -79,8 +79,8 @@ pub(super) fn read(path: &Path, npz: &mut NpzFile, members: &MemberNames) -> Res
     }
     let ids = match &members.ids {
         None => take_ids(&mut columns),
-        Some(name) => match columns.iter().find(|(column, _)| column == name) {
-            Some((_, ids)) => Some(ids.clone()),
+        Some(name) => match columns.iter().position(|(column, _)| column == name) {
+            Some(at) => Some(columns.remove(at).1),
             None => {
                 let why = unread.iter().find(|(member, _)| member == name);
                 let why = why.map(|(_, why)| format!(": it {why}")).unwrap_or_default();
@@ -180,9 +180,10 @@ pub(super) fn read_parquet(
     }
     let ids = match (&members.ids, ids) {
         (None, Some(ids)) => Some(ids),
+        (Some(name), Some(ids)) if name == ID => Some(ids),
         (None, None) => take_ids(&mut texts),
-        (Some(name), _) => match texts.iter().find(|(column, _)| column == name) {
-            Some((_, ids)) => Some(ids.clone()),
+        (Some(name), _) => match texts.iter().position(|(column, _)| column == name) {
+            Some(at) => Some(texts.remove(at).1),
             None => {
                 return Err(fault(format!("no column {name:?} (--ids) of text or whole numbers")));
             }

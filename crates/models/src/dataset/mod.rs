@@ -4,6 +4,7 @@
 //! with a matrix; labels are its own columns, those of a [`LabelFile`], or the names of the folders in
 //! which the recordings lie. [`LabelledTable::dataset`] gives linfa's data set.
 
+mod doubts;
 mod error;
 mod foreign;
 mod ids;

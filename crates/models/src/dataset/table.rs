@@ -100,12 +100,11 @@ impl LabelledTable {
         })
     }
 
-    /// Refuses a table without rows or with values that cannot be learned from; gives the features
-    /// that have one value in all rows.
+    /// Refuses a table without rows or with values that cannot be learned from.
     ///
     /// # Errors
     /// [`DatasetError::Content`] naming the recording and the feature.
-    pub fn check(&self) -> Result<Vec<usize>> {
+    pub fn check(&self) -> Result<()> {
         let fault = |reason: String| Err(DatasetError::content(&self.path, reason));
         if self.ids.is_empty() {
             return fault("has no recordings with features".into());
@@ -116,8 +115,7 @@ impl LabelledTable {
             let rows = if count == 1 { "1 row is" } else { &format!("{count} rows are") };
             return fault(format!("{id}: feature {name} is {value} ({rows} not finite)"));
         }
-        let columns = self.x.columns().into_iter().enumerate();
-        Ok(columns.filter(|(_, c)| c.iter().all(|v| *v == c[0])).map(|(i, _)| i).collect())
+        Ok(())
     }
 
     /// Adds labels from a source. Gives the names of columns that were there and are now hidden.

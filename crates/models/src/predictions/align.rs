@@ -69,7 +69,7 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
     }
 
     /// Weighted mean of tables over the same recordings, in the order of the first. A recording
-    /// without a prediction in one of them has none; one that some table lacks is allowed where the
+    /// without a prediction in one of them, or with a rejected one, has none; one that some table lacks is allowed where the
     /// others have no prediction of it either. Its status is the worst that a table gives.
     ///
     /// # Errors
@@ -258,7 +258,8 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
                     row.key
                 )));
             }
-            known.push(own.proba.is_some());
+            // A rejected prediction has probabilities, but is none.
+            known.push(own.class.is_some());
             if let Some(proba) = &own.proba {
                 to.iter_mut().zip(&order).for_each(|(to, &class)| *to = proba[class]);
             }

@@ -118,7 +118,11 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         let drawn = column.unwrap_or(by_default).to_string();
         let decimal = |text: &&str| text.parse::<f64>().is_ok() && text.parse::<i128>().is_err();
         let has_proba = self.rows.iter().any(|row| row.proba.is_some());
-        let numbers = !has_proba && truth.iter().any(decimal);
+        // The name of one class may look like a number.
+        let mut predicted = self.rows.iter().filter_map(|row| row.class);
+        let numbers = !has_proba
+            && truth.iter().any(decimal)
+            && predicted.all(|class| self.labels[class].parse::<f64>().is_ok());
         if !how.numeric {
             doubts::check_spelling(self, &truth, numbers)?;
         }

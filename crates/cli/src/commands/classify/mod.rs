@@ -39,7 +39,17 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     })?;
     let vote = args.vote.rule(&model.header().labels)?;
     if vote.is_some() && args.window.is_none() {
-        return Err(Failure::new("--vote needs --window"));
+        return Err(Failure::new(match args.features.is_some() {
+            true => {
+                "--vote needs --window, which takes recordings: a feature file gives one prediction a row"
+            }
+            false => "--vote needs --window",
+        }));
+    }
+    if args.reject > 0.0 {
+        model
+            .require_probabilities()
+            .map_err(|e| Failure::new(format!("{place}: --reject: {e}")))?;
     }
     if args.features.is_none() {
         args.members.refuse()?;
