@@ -375,5 +375,8 @@ fn a_member_that_is_there_twice_is_named() {
     let (one, two) = (wav(1), wav(2));
     let members: [(&str, &[u8]); 2] = [("r.wav", &one), ("r.wav", &two)];
     let refused = collect(&archive(&folder, "a.tar", &members)).unwrap_err();
-    assert!(refused.contains("a.tar/r.wav: the archive is named twice, or has this member twice"), "{refused}");
+    assert!(
+        refused.contains("a.tar/r.wav: the archive is named twice, or has this member twice"),
+        "{refused}"
+    );
 }
