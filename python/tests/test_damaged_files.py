@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,15 @@ import pytest
 import soundfile
 
 pytest.importorskip("pyarrow")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("audio")
+    rng = np.random.default_rng(1)
+    for name in ("a", "b"):
+        soundfile.write(folder / f"{name}.wav", 0.1 * rng.standard_normal(4000), 8000)
+    return folder
 
 
 def content(path: Path) -> list[Any]:
@@ -23,12 +33,11 @@ def content(path: Path) -> list[Any]:
 
 @pytest.mark.parametrize("ending", ["npz", "parquet"])
 @pytest.mark.parametrize("preset", ["mfcc-zcr", "logmel"])
-def test_no_flipped_bit_gives_other_values(tmp_path: Path, ending: str, preset: str) -> None:
-    rng = np.random.default_rng(1)
-    for name in ("a", "b"):
-        soundfile.write(tmp_path / f"{name}.wav", 0.1 * rng.standard_normal(4000), 8000)
+def test_no_flipped_bit_gives_other_values(
+    folder: Path, tmp_path: Path, ending: str, preset: str
+) -> None:
     out, damaged = tmp_path / f"out.{ending}", tmp_path / f"damaged.{ending}"
-    cf.extract([tmp_path], preset=preset, out=out)
+    cf.extract([folder], preset=preset, out=out)
     whole, bytes_ = content(out), out.read_bytes()
     refused = 0
     # Evenly over the file, and all bits in turn.
@@ -45,11 +54,9 @@ def test_no_flipped_bit_gives_other_values(tmp_path: Path, ending: str, preset: 
     assert refused > len(bits) // 2
 
 
-def test_a_damaged_table_says_so(tmp_path: Path) -> None:
-    rng = np.random.default_rng(1)
-    soundfile.write(tmp_path / "a.wav", 0.1 * rng.standard_normal(4000), 8000)
+def test_a_damaged_table_says_so(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "out.parquet"
-    cf.extract([tmp_path], preset="mfcc-zcr", out=out)
+    cf.extract([folder], preset="mfcc-zcr", out=out)
     changed = out.read_bytes().replace(b"mfcc[7].std", b"mfcc[8].std")
     out.write_bytes(changed)
     with pytest.raises(cf.ParameterError, match="do not match their hash"):
@@ -64,3 +71,17 @@ def test_an_archive_without_its_ids_is_no_output(tmp_path: Path) -> None:
     np.savez(path, **texts)
     with pytest.raises(cf.ParameterError, match="it has no __ids__"):
         cf.load_features(path)
+
+
+def test_damaged_frames_are_refused_when_they_are_read(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "frames.npz"
+    cf.extract([folder], preset="logmel", out=out)
+    with zipfile.ZipFile(out) as archive:
+        at = archive.getinfo("b.npy").header_offset + 400
+    content = bytearray(out.read_bytes())
+    content[at] ^= 1
+    out.write_bytes(content)
+    features = cf.load_features(out)
+    assert features["a"].size
+    with pytest.raises(cf.ParameterError, match=r"frames\.npz: member b cannot be read"):
+        features["b"]
