@@ -20,7 +20,7 @@ _NEEDED = ("__meta__", "__config__", "__ids__", "__outcomes__")
 def of_npz(name: str) -> dict[str, Any]:
     """The fields of `Features` from an archive. Arrays of frames are read on first access."""
     # numpy leaves a file open that is no archive.
-    file = open(name, "rb")  # noqa: SIM115
+    file: Any = open(name, "rb")  # noqa: SIM115
     try:
         archive = np.load(file, allow_pickle=False)
     except (ValueError, EOFError, zipfile.BadZipFile) as error:
@@ -57,22 +57,23 @@ def _fields(archive: Any, name: str) -> dict[str, Any]:
         raise ParameterError(f"{name} is damaged: its directory hides members")
     frames = [member for member in members if _is_frames(member)]
     run = {k: read_member(archive, name, k) for k in members if not _is_frames(k)}
-    if "__summary__" in run:
-        for member in frames:  # none of ours: added, or of a name that damage has changed
-            read_member(archive, name, member)
     config = json.loads(run["__config__"].tobytes())
+    ids = [str(i) for i in run["__ids__"]]
+    known = set(ids)
     arrays: dict[str, Any] = {}
     times: dict[str, Any] = {}
     several = len(config["features"]) > 1
     for member in frames:
         key = member.removeprefix(_TIMES)
         into = arrays if key == member else times
+        recording, _, feature = key.rpartition("/") if several else (key, "", "")
+        if recording not in known:
+            # Added by someone, or renamed by damage, which reading notices.
+            read_member(archive, name, member)
         if several:
-            recording, _, feature = key.rpartition("/")
             into.setdefault(recording, {})[feature] = member
         else:
             into[key] = member
-    ids = [str(i) for i in run["__ids__"]]
     summary, names = run.get("__summary__"), [str(n) for n in run.get("__summary_names__", ())]
     if summary is not None and summary.shape != (len(ids), len(names)):
         raise ParameterError(
@@ -101,15 +102,11 @@ def _fields(archive: Any, name: str) -> dict[str, Any]:
 def _require(
     name: str, what: str, found: dict[str, Any], ids: list[str], features: list[str] | None
 ) -> None:
-    """Refuses members that are not those of the recordings: damage renames or hides some."""
-    wanted = set(ids)
-    other = wanted ^ found.keys()
-    if features is not None:
-        other |= {i for i in wanted & found.keys() if found[i].keys() != set(features)}
-    if other:
-        first = min(other)
-        kind = "has" if first in found and first not in wanted else "lacks"
-        raise ParameterError(f"{name} is damaged: it {kind} {what} of {first!r}")
+    """Refuses an archive that lacks members of a recording: damage renames or hides some."""
+    wanted = set(features or ())
+    for recording in ids:
+        if recording not in found or (wanted and not wanted <= found[recording].keys()):
+            raise ParameterError(f"{name} is damaged: it lacks {what} of {recording!r}")
 
 
 def _holds_objects(archive: Any, member: str) -> bool:

@@ -4,6 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use corsmal_models::fusion;
+use corsmal_models::predictions::PredictionRow;
 use ndarray::{Array2, ArrayView1};
 
 use crate::dataset::{Category, Container, Filling, FillingLevel, FillingType};
@@ -101,7 +102,7 @@ pub fn decide_joint(table: &RecordingPredictions) -> Result<Vec<SubmissionRow>> 
         let filling = table.rows[row].class.map(|class| fillings[class]);
         estimate.kind = filling.map(Filling::kind);
         estimate.level = filling.map(Filling::level);
-        if table.rows[row].proba.is_some() {
+        if is_predicted(&table.rows[row]) {
             estimate.kind_probabilities = fixed(kinds.row(row));
             estimate.level_probabilities = fixed(levels.row(row));
         }
@@ -117,8 +118,9 @@ fn of_kind(table: &RecordingPredictions) -> Result<Vec<SubmissionRow>> {
     let mut estimates = blank(table)?;
     for (row, estimate) in estimates.iter_mut().enumerate() {
         estimate.kind = table.rows[row].class.map(|class| classes[class]);
-        estimate.kind_probabilities =
-            table.rows[row].proba.as_ref().and_then(|_| fixed(merged.row(row)));
+        if is_predicted(&table.rows[row]) {
+            estimate.kind_probabilities = fixed(merged.row(row));
+        }
     }
     Ok(estimates)
 }
@@ -131,10 +133,16 @@ fn of_level(table: &RecordingPredictions) -> Result<Vec<SubmissionRow>> {
     let mut estimates = blank(table)?;
     for (row, estimate) in estimates.iter_mut().enumerate() {
         estimate.level = table.rows[row].class.map(|class| classes[class]);
-        estimate.level_probabilities =
-            table.rows[row].proba.as_ref().and_then(|_| fixed(merged.row(row)));
+        if is_predicted(&table.rows[row]) {
+            estimate.level_probabilities = fixed(merged.row(row));
+        }
     }
     Ok(estimates)
+}
+
+/// Whether a prediction with probabilities was not rejected: those of a rejected one are withheld.
+fn is_predicted<K>(row: &PredictionRow<K>) -> bool {
+    row.class.is_some() && row.proba.is_some()
 }
 
 fn fixed<const N: usize>(row: ArrayView1<'_, f64>) -> Option<[f64; N]> {
@@ -222,6 +230,23 @@ mod tests {
         assert_eq!(pairs(Rule::JointDryBoxes), [(1, 1), (1, 2)]);
         let only = decide(Some(&kind), None, Rule::Joint, &Containers::new()).unwrap();
         assert!(only.iter().all(|p| p.level.is_none() && p.kind.is_some()));
+    }
+
+    /// A feasible pair was made of the probabilities of a rejected prediction.
+    #[test]
+    fn rejected_predictions_are_in_no_pair() {
+        let kind =
+            table("id,predicted,p_none,p_rice,p_water\n0,unknown,.4,.3,.3\n1,rice,.1,.8,.1\n");
+        let level =
+            table("id,predicted,p_empty,p_half,p_full\n0,empty,.8,.1,.1\n1,half,.1,.8,.1\n");
+        for rule in [Rule::Separate, Rule::Joint] {
+            let found = decide(Some(&kind), Some(&level), rule, &Containers::new()).unwrap();
+            assert_eq!((found[0].kind, found[0].kind_probabilities), (None, None));
+            assert!(found[0].level.is_some() && found[1].kind.is_some());
+        }
+        let joint = table("id,predicted,p_0,p_1\n0,unknown,.5,.5\n1,1,.2,.8\n");
+        let found = decide_joint(&joint).unwrap();
+        assert_eq!((found[0].kind, found[0].level_probabilities), (None, None));
     }
 
     #[test]

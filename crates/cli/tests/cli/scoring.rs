@@ -357,6 +357,9 @@ fn a_class_may_be_called_like_a_number() {
     assert!(
         refused(&["score", text(&file)]).contains("2: the true value \"2.5x\" is not a number")
     );
+    let lines = "id,true,predicted\n1,1.5,1.4\n2,2.5,n/a\n3,0.5,0.5\n";
+    let file = written(folder.path(), "e.csv", lines);
+    assert!(refused(&["score", text(&file)]).contains("2: the estimate \"n/a\" is not a number"));
 }
 
 /// `fuse` took the probabilities of predictions that `classify --reject` had withheld.

@@ -1,5 +1,6 @@
 //! Everything that a prediction file with true classes is scored by.
 
+use std::collections::HashSet;
 use std::fmt::Display;
 use std::hash::Hash;
 
@@ -118,11 +119,12 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         let drawn = column.unwrap_or(by_default).to_string();
         let decimal = |text: &&str| text.parse::<f64>().is_ok() && text.parse::<i128>().is_err();
         let has_proba = self.rows.iter().any(|row| row.proba.is_some());
-        // The name of one class may look like a number.
+        // The name of one class may look like a number: others are no numbers, and are predicted.
+        let is_name = |text: &&str| text.parse::<f64>().is_err();
+        let names: HashSet<&str> = truth.iter().copied().filter(is_name).collect();
         let mut predicted = self.rows.iter().filter_map(|row| row.class);
-        let numbers = !has_proba
-            && truth.iter().any(decimal)
-            && predicted.all(|class| self.labels[class].parse::<f64>().is_ok());
+        let are_classes = predicted.any(|class| names.contains(self.labels[class].as_str()));
+        let numbers = !has_proba && truth.iter().any(decimal) && !are_classes;
         if !how.numeric {
             doubts::check_spelling(self, &truth, numbers)?;
         }
