@@ -54,6 +54,7 @@ pub mod parquet;
 pub mod partition;
 pub mod provenance;
 pub mod quote;
+pub mod sealed;
 pub mod settings;
 pub mod shard;
 pub mod shield;

@@ -4,6 +4,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 
+use corsmal_files::sealed::Seal;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -14,7 +15,7 @@ use crate::network::Network;
 use crate::parameters::Parameters;
 use crate::recipe::Recipe;
 use crate::trainer::Trainer;
-use crate::weights::{self, Seal, State, WeightsError};
+use crate::weights::{self, State, WeightsError};
 
 const ENTRY: &str = "corsmal-feat-checkpoint";
 
@@ -138,7 +139,7 @@ pub(crate) fn resume(
     }
     let state = weights::from_safetensors(&bytes).map_err(content)?;
     let damaged = |reason| content(format!("the checkpoint is {reason}; remove it"));
-    seal.check(&state).map_err(damaged)?;
+    seal.check(weights::numbers(&state)).map_err(damaged)?;
     let mut parts: HashMap<String, State> = HashMap::new();
     for (name, shape, values) in state {
         let (part, name) = name.split_once('.').unwrap_or(("", &name));

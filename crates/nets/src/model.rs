@@ -117,7 +117,7 @@ impl NetModel {
         let mut network =
             definition.build(Some(header.labels.len()), 0).map_err(|e| e.to_string())?;
         let state = weights::from_safetensors(bytes)?;
-        seal.check(&state)?;
+        seal.check(weights::numbers(&state))?;
         network.load_state(&state).map_err(|e| e.to_string())?;
         Self::new(header, network).map_err(|e| e.to_string())
     }

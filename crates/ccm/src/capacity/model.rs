@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use corsmal_files::sealed::{self, Seal};
 use corsmal_files::{content, draft};
 use corsmal_vision::category::{Category, Vote};
 use corsmal_vision::fused::{Example, Fusion};
@@ -22,8 +23,6 @@ const MAX_BYTES: u64 = 8 << 20;
 const SIZES: usize = 8;
 /// Name of the file format.
 const KIND: &str = "corsmal-feat capacity model";
-/// The key under which a file has the hash of the rest.
-const HASH: &str = "hash";
 
 /// M3: a Gaussian process for each category.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -48,11 +47,6 @@ pub struct CapacityModel {
     pub m3: M3,
     /// Reliability of the methods; `None` where only M3 was learned.
     pub fusion: Option<Fusion>,
-}
-
-/// Of what a file says, however it is spaced.
-fn hash_of(model: &Value) -> String {
-    blake3::hash(model.to_string().as_bytes()).to_hex().to_string()
 }
 
 /// A recording to learn from.
@@ -242,13 +236,10 @@ impl CapacityModel {
             ))
         };
         let mut value: Value = serde_json::from_slice(&bytes).map_err(refuse)?;
-        // Files of earlier versions have no hash.
-        let hash = value.as_object_mut().and_then(|entries| entries.shift_remove(HASH));
-        if value["kind"] == KIND && hash.is_some_and(|hash| hash != *hash_of(&value)) {
-            return Err(CcmError::Request(format!(
-                "{}: damaged: its content does not match the hash written with it",
-                path.display()
-            )));
+        let seal = Seal::take(&mut value);
+        if value["kind"] == KIND {
+            seal.check(|_| ())
+                .map_err(|why| CcmError::Request(format!("{}: {why}", path.display())))?;
         }
         let model: Self = serde_json::from_value(value).map_err(refuse)?;
         if (model.kind.as_str(), model.format) != (KIND, FORMAT) {
@@ -273,9 +264,9 @@ impl CapacityModel {
     /// # Errors
     /// [`CcmError`] when it cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let mut value = serde_json::to_value(self)
-            .map_err(|e| CcmError::Request(format!("{}: {e}", path.display())))?;
-        value[HASH] = hash_of(&value).into();
+        let refuse = |why: String| CcmError::Request(format!("{}: {why}", path.display()));
+        let mut value = serde_json::to_value(self).map_err(|e| refuse(e.to_string()))?;
+        sealed::seal(&mut value, |_| ()).map_err(refuse)?;
         draft::write(path, value.to_string().as_bytes()).map_err(CcmError::Write)
     }
 }

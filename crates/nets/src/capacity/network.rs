@@ -86,7 +86,7 @@ impl CapacityNetwork {
             })?;
         header.recipe.check().map_err(|e| e.to_string())?;
         let state = weights::from_safetensors(bytes)?;
-        seal.check(&state)?;
+        seal.check(weights::numbers(&state))?;
         let network = loaded(&state).map_err(|e| no_model(&e.to_string()))?;
         if header.network != network.name() {
             return Err(no_model(&format!("it names the network {}", header.network)));

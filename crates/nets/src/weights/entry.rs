@@ -4,12 +4,13 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use corsmal_files::sealed::Seal;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use super::numbers::State;
 use super::safetensors::{safetensors_text, safetensors_texts};
-use super::seal::Seal;
+use super::seal::numbers;
 
 /// How the names of our entries begin.
 const OURS: &str = "corsmal-feat";
@@ -44,7 +45,7 @@ pub(crate) fn entry<T: DeserializeOwned>(
 pub(super) fn check_ours(bytes: &[u8], state: &State) -> Result<(), String> {
     for (_, text) in safetensors_texts(bytes)?.iter().filter(|(name, _)| name.starts_with(OURS)) {
         let mut entry: Value = serde_json::from_str(text).map_err(|e| e.to_string())?;
-        Seal::take(&mut entry).check(state)?;
+        Seal::take(&mut entry).check(numbers(state))?;
     }
     Ok(())
 }

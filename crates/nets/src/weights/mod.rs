@@ -20,7 +20,7 @@ pub use entry::trained_here;
 pub use error::WeightsError;
 pub use numbers::{MAX_FILE, State};
 pub use safetensors::{from_safetensors, safetensors_shapes, safetensors_text, to_safetensors};
-pub(crate) use seal::{Seal, sealed};
+pub(crate) use seal::{numbers, sealed};
 
 /// How weights are written.
 enum Format {
