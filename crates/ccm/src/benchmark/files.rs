@@ -131,7 +131,7 @@ pub(super) fn write_completed(
         for (part, estimates) in rows.tests.iter().zip(method.tests()) {
             let Some(estimates) = estimates else { continue };
             let pairs: Vec<_> = part.rows.iter().zip(estimates).collect();
-            write_submissions(out, &format!("{slug}-{}", self::slug(part.subset)), &pairs)?;
+            write_submissions(out, &format!("{slug}-{}", part.subset.slug()), &pairs)?;
         }
     }
     Ok(())
@@ -149,7 +149,7 @@ fn write_estimates(
     write_submissions(out, &format!("{name}-held-out"), &held_out.collect::<Vec<_>>())?;
     for (part, estimates) in rows.tests.iter().zip(tests) {
         let pairs: Vec<_> = part.rows.iter().zip(estimates).collect();
-        write_submissions(out, &format!("{name}-{}", slug(part.subset)), &pairs)?;
+        write_submissions(out, &format!("{name}-{}", part.subset.slug()), &pairs)?;
     }
     Ok(())
 }
@@ -162,13 +162,9 @@ pub(super) fn write_random(out: &Path, rows: &Rows, seed: u64) -> Result<()> {
         let estimates: Vec<_> =
             pseudo_random(&keys, seed).into_iter().map(Estimate::from).collect();
         let pairs: Vec<_> = targets.iter().zip(&estimates).collect();
-        write_submissions(out, &format!("random-{}", slug(part)), &pairs)?;
+        write_submissions(out, &format!("random-{}", part.slug()), &pairs)?;
     }
     Ok(())
-}
-
-fn slug(part: Subset) -> String {
-    part.name().replace(' ', "-")
 }
 
 /// Writes estimates in every official format that can name the recordings: of 2020 by container and

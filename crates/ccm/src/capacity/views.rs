@@ -59,9 +59,9 @@ impl Views {
             detections: detections.map(Into::into),
             group: match recording.container {
                 Some(container) => container.number().to_string(),
-                None => recording.part.name().replace(' ', "-"),
+                None => recording.part.slug(),
             },
-            part: recording.container.map(|_| recording.part.name().replace(' ', "-")),
+            part: recording.container.map(|_| recording.part.slug()),
             frames: Default::default(),
             videos: Default::default(),
         }

@@ -109,6 +109,11 @@ impl Subset {
         }
     }
 
+    /// Name as used in folders and files that this program writes: `public-test`.
+    pub fn slug(self) -> String {
+        self.name().replace(' ', "-")
+    }
+
     /// Containers of this part.
     pub fn containers(self) -> impl Iterator<Item = Container> {
         Container::all().filter(move |c| c.subset() == self)
