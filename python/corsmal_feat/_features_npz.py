@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import zipfile
+from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
@@ -20,27 +21,23 @@ _NEEDED = ("__meta__", "__config__", "__ids__", "__outcomes__")
 def of_npz(name: str) -> dict[str, Any]:
     """The fields of `Features` from an archive. Arrays of frames are read on first access."""
     # numpy leaves a file open that is no archive.
-    file: Any = open(name, "rb")  # noqa: SIM115
-    try:
-        archive = np.load(file, allow_pickle=False)
-    except (ValueError, EOFError, zipfile.BadZipFile) as error:
-        file.close()
-        raise ParameterError(
-            f"{name} is not an output of corsmal-feat: it is not an .npz archive; corsmal_feat.load"
-            " reads recordings"
-        ) from error
-    except Exception as error:  # whatever zipfile makes of a damaged directory
-        file.close()
-        raise ParameterError(f"{name} is damaged: {error}") from error
-    if not isinstance(archive, np.lib.npyio.NpzFile):
-        file.close()
-        raise ParameterError(f"{name} is not an output of corsmal-feat: it is a single array")
-    archive.fid = file  # closed with the archive
-    try:
-        return _fields(archive, name)
-    except BaseException:
-        archive.close()
-        raise
+    with ExitStack() as stack:
+        file: Any = stack.enter_context(open(name, "rb"))
+        try:
+            archive = np.load(file, allow_pickle=False)
+        except (ValueError, EOFError, zipfile.BadZipFile) as error:
+            raise ParameterError(
+                f"{name} is not an output of corsmal-feat: it is not an .npz archive;"
+                " corsmal_feat.load reads recordings"
+            ) from error
+        except Exception as error:  # whatever zipfile makes of a damaged directory
+            raise ParameterError(f"{name} is damaged: {error}") from error
+        if not isinstance(archive, np.lib.npyio.NpzFile):
+            raise ParameterError(f"{name} is not an output of corsmal-feat: it is a single array")
+        archive.fid = file
+        fields = _fields(archive, name)
+        stack.pop_all()  # it is closed with the archive from now on
+        return fields
 
 
 def _fields(archive: Any, name: str) -> dict[str, Any]:

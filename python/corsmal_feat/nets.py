@@ -348,9 +348,9 @@ def _rows(
         if values is not None:
             check_named(what, given, values, "nets")
     kind = label_kind(labels)
-    names = [str(label) for label in labels.tolist()]
-    if kind == "f" and all(float(label).is_integer() for label in labels.tolist()):
-        names = [str(int(label)) for label in labels.tolist()]  # "1.0" is no name of a class
+    # "1.0" is no name of a class.
+    are_whole = kind == "f" and all(float(label).is_integer() for label in labels.tolist())
+    names = [str(int(label) if are_whole else label) for label in labels.tolist()]
     parts = [None] * len(paths) if of_group is None else [str(g) for g in of_group.tolist()]
     return list(zip(paths, names, parts, strict=True)), kind
 
