@@ -85,7 +85,7 @@ pub fn delta_weights(p: &DeltaParams) -> Result<Vec<f64>> {
     match weights.iter().all(|weight| weight.is_finite()) {
         true => Ok(weights),
         false => {
-            let allowed = "so low, for this width, that the weights stay finite";
+            let allowed = "low enough for this width that the weights stay finite";
             Err(DspError::parameter("order", p.order, allowed))
         }
     }

@@ -27,6 +27,7 @@ pub const EXTENSIONS: [&str; 3] = ["csv", "jsonl", "ndjson"];
 pub const MAX_LINE: usize = 1 << 20;
 /// Most columns of a CSV, and most different keys of JSON lines.
 pub const MAX_COLUMNS: usize = 4096;
+
 const PATH: &str = "path";
 pub(crate) const ID: &str = "id";
 const START: &str = "start";

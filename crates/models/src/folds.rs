@@ -299,7 +299,7 @@ fn refuse_split(
             if other != fold.name {
                 let remedy = match is_named {
                     true => "--groups must not be split",
-                    false => "name the groups with --groups if that is right",
+                    false => "to allow this, name the groups with --groups",
                 };
                 let reason = format!(
                     "{plan}: {column} {} is in the folds {other} and {}; {remedy}",

@@ -128,8 +128,8 @@ impl Added {
                 // What fits in part may be of another part, of which recordings are missing.
                 if count != there && count != size(*one) {
                     return Err(CcmError::Request(format!(
-                        "{}: {there} of its {count} ids are those of the {} recordings; give these alone, or all {} \
-                         of the part",
+                        "{}: only {there} of its {count} ids are {} recordings of the data folder; give these alone, or \
+                         all {} of the part",
                         self.path.display(),
                         one.name(),
                         size(*one)

@@ -216,7 +216,7 @@ fn a_file_of_ids_is_about_the_part_that_it_fits() {
     // All that there is of the part, though the official one has more.
     assert!(!submission(3).map_err(|e| e.to_string()).unwrap(), "public test, without labels");
     let error = submission(5).unwrap_err().to_string();
-    assert!(error.contains("3 of its 5 ids are those of the public test recordings"), "{error}");
+    assert!(error.contains("only 3 of its 5 ids are public test recordings"), "{error}");
     let error = submission(60).unwrap_err().to_string();
     assert!(error.contains("its ids fit several parts"), "{error}");
 }

@@ -50,8 +50,8 @@ pub(super) fn join(recordings: &mut [Entry], labels: Vec<Labels>) -> Result<(), 
         if bytes > MAX_LABEL_BYTES {
             let name = quoted(&name.to_string_lossy());
             return Err(format!(
-                "its labels have more than {MAX_LABEL_BYTES} bytes in all recordings together; {name} gives \
-                 {length} to each of {}",
+                "the labels of all its recordings exceed {MAX_LABEL_BYTES} bytes; {name} adds {length} to each of {} \
+                 recordings",
                 of.len()
             ));
         }

@@ -16,8 +16,8 @@ pub fn require_cells(rows: usize, columns: usize, names: usize) -> Result<(), St
     }
     if rows.saturating_mul(names) > MAX_LABEL_BYTES {
         return Err(format!(
-            "the names of the label columns have {names} bytes, too many for {rows} rows: at most \
-             {MAX_LABEL_BYTES} bytes in all rows together; shorten the names"
+            "the names of the label columns have {names} bytes, too many for {rows} rows: names times rows may \
+             have {MAX_LABEL_BYTES} bytes; shorten the names"
         ));
     }
     Ok(())

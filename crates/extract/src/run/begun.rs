@@ -190,8 +190,9 @@ fn resume(
         }
         let id = &record.outcome.id;
         if input.source.comes_once() {
-            let why = "came from a stream, which may be another one now";
-            progress.warning(&format!("{id} {why}; the run continues from there"));
+            progress.warning(&format!(
+                "{id} came from a stream, so it is read again; the run continues from there"
+            ));
             return false;
         }
         let same = record.outcome.identity == now;
@@ -199,8 +200,8 @@ fn resume(
             progress.warning(&format!("{id} has changed; the run continues from there"));
         } else if now == identity::STREAM && !unversioned.replace(true) {
             progress.warning(&format!(
-                "{id}: its server gives neither ETag nor Last-Modified, which would tell whether it has changed; its \
-                 features are kept (reported once per run)"
+                "{id}: its server sends neither ETag nor Last-Modified, so it may have changed unnoticed; its features \
+                 are kept (reported once per run)"
             ));
         }
         same

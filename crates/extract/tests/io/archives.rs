@@ -366,7 +366,7 @@ fn labels_of_many_recordings_are_bounded() {
         names.iter().map(|name| (&**name, &b"RIFF"[..])).collect();
     members.push(("x.json", label.as_bytes()));
     let refused = collect(&archive(&folder, "a.tar", &members)).unwrap_err();
-    assert!(refused.contains("gives 1000001 to each of 1200"), "{refused}");
+    assert!(refused.contains("adds 1000001 to each of 1200 recordings"), "{refused}");
 }
 
 #[test]

@@ -28,7 +28,7 @@ pub enum ParquetTableError {
         source: ParquetError,
     },
     /// A file of ours does not match its hashes.
-    #[error("{path}: the file is damaged: {reason}; write it again")]
+    #[error("{path}: the file is damaged: {reason}; restore it from a copy or make it again")]
     Damaged {
         /// The file.
         path: PathBuf,

@@ -130,9 +130,9 @@ impl SealedFile {
         };
         let (blocks, hash) = match (find(BLOCKS), find(HASH)) {
             (None, None) if find(META).is_some() => return Ok(()),
-            (None, None) => return Err(damaged("its metadata are not where they belong")),
+            (None, None) => return Err(damaged("its metadata are missing")),
             (Some(blocks), Some(hash)) => (blocks, hash),
-            _ => return Err(damaged("its metadata have one of two hashes")),
+            _ => return Err(damaged("one of its two hashes is missing")),
         };
         let count = blocks.len() / DIGITS;
         let rest = count as u64 * BLOCK;
@@ -140,7 +140,7 @@ impl SealedFile {
         let are_digits =
             blocks.len() == count * DIGITS && blocks.bytes().all(|digit| digit.is_ascii_hexdigit());
         let place = place.filter(|place| *place >= rest && are_digits);
-        let place = place.ok_or_else(|| damaged("its hashes are not where they belong"))?;
+        let place = place.ok_or_else(|| damaged("its hashes are misplaced"))?;
         if self.hash_of_rest(rest, place)? != hash {
             return Err(damaged("its metadata do not match their hash"));
         }

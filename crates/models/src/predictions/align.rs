@@ -69,8 +69,8 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
     }
 
     /// Weighted mean of tables over the same recordings, in the order of the first. A recording
-    /// without a prediction in one of them, or with a rejected one, has none; one that some table lacks is allowed where the
-    /// others have no prediction of it either. Its status is the worst that a table gives.
+    /// without a prediction in one of them, or with a rejected one, has none; one that some table
+    /// lacks is allowed where the others have no prediction of it either. Its status is the worst that a table gives.
     ///
     /// # Errors
     /// [`PredictionError`] for no tables, weights that are not one positive number per table, other
