@@ -172,8 +172,9 @@ def main() -> None:
         for path in sorted(work.glob("*.npz")):
             seed("npz", path.name, path.read_bytes())
         files = [(work / n).read_bytes() for n in ("frames.npz", "small.npz", "table.npz")]
-        # As files of version 0.1.0, whose damage no hash hides from the readers.
         table = (work / "table.parquet").read_bytes()
+        seed("parquet", "hashes.parquet", table)
+        # As files of version 0.1.0, whose damage no hash hides from the readers.
         table = table.replace(b"corsmal.hash", b"corsmal.cash").replace(b"corsmal.b", b"corsmal.d")
         seed("parquet", "table.parquet", table)
         for i, (a, b) in enumerate([(files[0], files[1]), (files[2], table), (table, table)]):

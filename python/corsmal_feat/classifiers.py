@@ -385,12 +385,7 @@ class LogisticRegression(WeightedClassifier):
     _name = "logistic"
 
     def __init__(
-        self,
-        *,
-        C: float = 1.0,
-        class_weight: Any = None,
-        tol: float = 1e-8,
-        max_iter: int = 10_000,
+        self, *, C: float = 1.0, class_weight: Any = None, tol: float = 1e-8, max_iter: int = 10_000
     ) -> None:
         self.C = C
         self.class_weight = class_weight

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import pathlib
+from collections.abc import Callable
 
+import corsmal_feat
 import numpy as np
 import pytest
 import soundfile
@@ -58,3 +60,18 @@ def test_warnings_and_refusals_of_a_cross_validation(tmp_path: pathlib.Path) -> 
     with pytest.raises(CorsmalFeatError, match="cv 6 makes 6 folds") as refused:
         cross_validate(path, "y", classifier="knn", cv=9)
     assert "--" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: corsmal_feat.fft_frequencies(sr=np.array(8e3), n_fft="a"), "n_fft must be"),  # type: ignore[arg-type]
+        (lambda: corsmal_feat.mel_frequencies(3, fmax="a"), "fmax must be a number"),  # type: ignore[arg-type]
+        (lambda: corsmal_feat.stft(np.zeros(9), window=None), "window must be"),  # type: ignore[arg-type]
+        (lambda: corsmal_feat.times_like(10**400), "times_like|samples_like"),
+        (lambda: corsmal_feat.extract(["a", 3]), "each text or a path|each a path"),  # type: ignore[list-item]
+    ],
+)  # fmt: skip
+def test_the_argument_at_fault_is_named(call: Callable[[], object], message: str) -> None:
+    with pytest.raises(corsmal_feat.ParameterError, match=message):
+        call()

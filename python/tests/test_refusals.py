@@ -375,21 +375,6 @@ def test_errors_of_a_given_function_are_its_own(inputs: dict[str, Any]) -> None:
             call()
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: corsmal_feat.fft_frequencies(sr=np.array(8e3), n_fft="a"), "n_fft must be"),  # type: ignore[arg-type]
-        (lambda: corsmal_feat.mel_frequencies(3, fmax="a"), "fmax must be a number"),  # type: ignore[arg-type]
-        (lambda: corsmal_feat.stft(np.zeros(9), window=None), "window must be"),  # type: ignore[arg-type]
-        (lambda: corsmal_feat.times_like(10**400), "times_like|samples_like"),
-        (lambda: corsmal_feat.extract(["a", 3]), "each text or a path|each a path"),  # type: ignore[list-item]
-    ],
-)  # fmt: skip
-def test_the_argument_at_fault_is_named(call: Callable[[], object], message: str) -> None:
-    with pytest.raises(corsmal_feat.ParameterError, match=message):
-        call()
-
-
 def test_warnings_point_to_the_caller(inputs: dict[str, Any]) -> None:
     y = inputs["y"]
     for call in (

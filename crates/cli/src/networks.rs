@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 
 use corsmal_files::format::Content;
-use corsmal_models::folds::CvPlan;
+use corsmal_models::cv_plan::CvPlan;
 use corsmal_models::labels::alike;
 use corsmal_nets::NetError;
 use corsmal_nets::device::Device;

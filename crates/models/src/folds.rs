@@ -1,10 +1,10 @@
-//! Which rows are held out together, from `--cv`.
+//! Which rows are held out together.
 
 use std::collections::{HashMap, HashSet};
 use std::fmt;
-use std::str::FromStr;
 
 use crate::copies;
+use crate::cv_plan::CvPlan;
 use crate::dataset::{LabelledTable, Result};
 use crate::error::ModelError;
 use crate::groups::{self, RECORDING};
@@ -22,60 +22,6 @@ const ELSE: &str = "; --cv 5 without --groups needs none";
 /// Said where there is nothing else to hold out.
 const ONE_RECORDING: &str = "all rows are parts of one recording, so training and test rows are \
     neighbours: the scores are better than they would be on other recordings";
-
-/// A plan as written by the user.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum CvPlan {
-    /// `group=COLUMN`: each group once
-    Group(String),
-    /// `k=N` or `N`: this many folds, of whole groups where there are groups, else stratified
-    K(usize),
-    /// `lists=1,4,7/2,5,8`: these groups together
-    Lists(Vec<Vec<String>>),
-    /// `fold=COLUMN`: the column says the fold
-    Fold(String),
-}
-
-impl FromStr for CvPlan {
-    type Err = String;
-
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
-        let expected = || {
-            format!(
-                "{text:?}: expected a number of folds, group=COLUMN, k=N, \
-                 lists=1,4,7/2,5,8/3,6,9 or fold=COLUMN"
-            )
-        };
-        if let Ok(folds) = text.parse() {
-            return Ok(Self::K(folds));
-        }
-        let (kind, value) = text.split_once('=').ok_or_else(expected)?;
-        if value.is_empty() {
-            return Err(expected());
-        }
-        match kind {
-            "group" => Ok(Self::Group(value.into())),
-            "k" => value.parse().map(Self::K).map_err(|_| expected()),
-            "lists" => {
-                let list = |l: &str| l.split(',').map(|g| g.trim().to_string()).collect();
-                Ok(Self::Lists(value.split('/').map(list).collect()))
-            }
-            "fold" => Ok(Self::Fold(value.into())),
-            _ => Err(expected()),
-        }
-    }
-}
-
-impl fmt::Display for CvPlan {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Group(column) => write!(f, "each {column} once"),
-            Self::K(k) => write!(f, "{k} folds"),
-            Self::Lists(lists) => write!(f, "{} lists of groups", lists.len()),
-            Self::Fold(column) => write!(f, "the folds of column {column}"),
-        }
-    }
-}
 
 /// Outer folds and what inner folds are made of.
 #[derive(Clone, Debug)]
@@ -347,19 +293,6 @@ mod tests {
         let columns = columns.map(|(name, values)| (name.to_string(), owned(values)));
         let ids = owned(["r0", "r1", "r2", "r3"]);
         LabelledTable::of_columns(std::path::Path::new("x.npz"), ids, columns.to_vec())
-    }
-
-    #[test]
-    fn plans_are_read_as_written() {
-        let lists = vec![vec!["1".into(), "4".into()], vec!["2".into()]];
-        assert_eq!("lists=1, 4/2".parse(), Ok(CvPlan::Lists(lists)));
-        assert_eq!("k=3".parse(), Ok(CvPlan::K(3)));
-        assert_eq!("group=container".parse(), Ok(CvPlan::Group("container".into())));
-        assert_eq!("fold=fold".parse(), Ok(CvPlan::Fold("fold".into())));
-        assert_eq!("5".parse(), Ok(CvPlan::K(5)));
-        for wrong in ["k=", "k=x", "leave=1", "-3", ""] {
-            assert!(wrong.parse::<CvPlan>().is_err(), "{wrong}");
-        }
     }
 
     #[test]

@@ -36,7 +36,7 @@
 //! |---|---|
 //! | read features with labels | [`dataset`], [`labels`] |
 //! | choose, train and store a pipeline | [`classifiers`], [`steps`], [`pipeline`], [`model_file`] |
-//! | score on rows that were not trained on | [`folds`], [`splits`], [`cross_validation`], [`scores`] |
+//! | score on rows that were not trained on | [`cv_plan`], [`folds`], [`splits`], [`cross_validation`], [`scores`] |
 //! | choose parameters, explain a model | [`grid`], [`validation`], [`explain`] |
 //! | read, write, join and compare predictions | [`predictions`], [`fusion`], [`voting`], [`comparison`] |
 
@@ -44,6 +44,7 @@ pub mod classifiers;
 pub mod comparison;
 mod copies;
 pub mod cross_validation;
+pub mod cv_plan;
 pub mod dataset;
 mod dominance;
 pub mod error;

@@ -5,9 +5,10 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::cross_validation::{CrossValidation, Data, cross_validate, nested_cross_validate};
+use crate::cv_plan::CvPlan;
 use crate::dataset::{DatasetError, LabelledTable, Result};
 use crate::dominance::dominance;
-use crate::folds::{CvPlan, Folds};
+use crate::folds::Folds;
 use crate::labels::Labels;
 use crate::pipeline::PipelineSpec;
 use crate::predictions::PredictionTable;

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use corsmal_models::argmax;
 use corsmal_models::cross_validation::CrossValidation;
-use corsmal_models::folds::{CvPlan, Folds};
+use corsmal_models::cv_plan::CvPlan;
+use corsmal_models::folds::Folds;
 use corsmal_models::fusion::WindowVotes;
 use corsmal_models::groups;
 use corsmal_models::labels::Labels;

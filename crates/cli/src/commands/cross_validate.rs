@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use corsmal_models::cross_validation::CrossValidation;
+use corsmal_models::cv_plan::CvPlan;
 use corsmal_models::dataset::LabelledTable;
-use corsmal_models::folds::{CvPlan, Folds};
+use corsmal_models::folds::Folds;
 use corsmal_models::pipeline::PipelineSpec;
 use corsmal_models::predictions::PredictionTable;
 use corsmal_models::scores::{ClassReport, Scores};

@@ -302,6 +302,16 @@ fn contradictions_and_repeated_windows_are_not_fused() {
     let partly = put("w.csv", "id,start,true,predicted\na,0,,x\na,1,x,x\n");
     let voted = done(&["fuse", text(&partly), "--vote", "majority", "-o", "-"]);
     assert!(voted.contains("a,x,x"), "{voted}");
+    // Other labels: the first window, or file, had the last word.
+    let levels =
+        put("w.csv", "id,start,level,kind,predicted\na,0,1,,x\na,1,2,z,x\na,2,1,z,y\nb,0,3,,y\n");
+    let voted = done(&["fuse", text(&levels), "--vote", "majority", "-o", "-"]);
+    assert!(voted.starts_with("id,level,kind,predicted,p_x,p_y\na,,z,x,"), "{voted}");
+    assert!(voted.contains("\nb,3,,y,"), "{voted}");
+    let level = |a: &str| format!("id,level,predicted,p_x,p_y\na,{a},x,0.9,0.1\nb,2,y,0.2,0.8\n");
+    let (one, two) = (put("4.csv", &level("1")), put("5.csv", &level("2")));
+    let fused = done(&["fuse", text(&one), text(&two), "-o", "-"]);
+    assert!(fused.contains("\na,,x,") && fused.contains("\nb,2,y,"), "{fused}");
     let lengths = put("w.csv", "id,start,end,predicted\na,0,1,x\na,0,2,y\na,1,2,y\n");
     assert!(done(&["fuse", text(&lengths), "--vote", "majority", "-o", "-"]).contains("\na,y,"));
 }

@@ -19,7 +19,7 @@ const AGREED: [&str; 3] = ["true", "fold", "group"];
 
 impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
     /// Makes the windows of each recording one decision, in the order in which recordings appear. Its status is
-    /// the worst of theirs.
+    /// the worst of theirs; another column is empty where two of them say different things.
     ///
     /// # Errors
     /// What the rule refuses; a window that occurs twice, windows of a recording that contradict each
@@ -28,10 +28,10 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         if let Some(fault) = self.repeated_window() {
             return Err(fault);
         }
-        let agreed = AGREED.map(|name| Some((name, self.position(name)?)));
         let status = self.position(STATUS);
         let mut at: HashMap<&K, usize> = HashMap::new();
         let mut recordings: Vec<(PredictionRow<K>, WindowVotes)> = Vec::new();
+        let mut differing: HashSet<(usize, usize)> = HashSet::new();
         for row in &self.rows {
             let next = recordings.len();
             let slot = *at.entry(&row.key).or_insert(next);
@@ -39,16 +39,23 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
                 recordings.push((row.clone(), WindowVotes::new(self.labels.len())));
             }
             let (recording, votes) = &mut recordings[slot];
-            for (column, at) in agreed.into_iter().flatten() {
+            for at in (self.naming..self.columns.len()).filter(|&at| Some(at) != status) {
                 let (one, two) = (&mut recording.cells[at], &row.cells[at]);
+                let column = self.columns[at].as_str();
+                if two.is_empty() || one == two || differing.contains(&(slot, at)) {
+                    continue;
+                }
                 if one.is_empty() {
                     one.clone_from(two);
-                } else if !two.is_empty() && one != two {
+                } else if AGREED.contains(&column) {
                     return Err(self.content(format!(
                         "{}: {column} is {one} in one window and {two} in another; a vote needs \
                          one value for each recording, or a file without the column",
                         row.key
                     )));
+                } else {
+                    one.clear();
+                    differing.insert((slot, at));
                 }
             }
             if let Some(at) = status {
@@ -154,16 +161,21 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
     }
 
     /// Refuses tables that give a recording two true classes, folds or groups, and takes over what
-    /// this one leaves empty.
+    /// this one leaves empty. Another column is empty where tables say different things.
     fn agree_with(&mut self, tables: &[Self]) -> Result<()> {
-        for name in AGREED {
+        let others = self.columns[self.naming..].iter().map(String::as_str);
+        let others = others.filter(|name| *name != STATUS && !AGREED.contains(name));
+        for name in AGREED.into_iter().chain(others) {
             let mut said: HashMap<&K, (&str, &Self)> = HashMap::new();
             for table in tables {
                 let Some(at) = table.position(name) else { continue };
                 for row in table.rows.iter().filter(|row| !row.cells[at].is_empty()) {
                     let own = row.cells[at].as_str();
-                    let &mut (their, other) = said.entry(&row.key).or_insert((own, table));
-                    if own != their {
+                    let (their, other) = said.entry(&row.key).or_insert((own, table));
+                    if own == *their {
+                        continue;
+                    }
+                    if AGREED.contains(&name) {
                         return Err(table.content(format!(
                             "{}: {name} is {own} here and {their} in {}: correct it, or remove \
                              the column {name} from one of the files",
@@ -171,9 +183,10 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
                             other.path.display()
                         )));
                     }
+                    *their = "";
                 }
             }
-            let Some(at) = self.position(name) else { continue };
+            let Some(at) = self.columns.iter().position(|column| column == name) else { continue };
             for row in &mut self.rows {
                 if let Some((value, _)) = said.get(&row.key) {
                     row.cells[at] = (*value).to_string();

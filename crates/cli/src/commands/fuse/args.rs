@@ -24,7 +24,8 @@ Examples:
     --out submission.csv
 
 Prediction files are those of `classify` and `cross-validate --predictions`, or have columns
-Object,Sequence,p0,p1,… True classes, folds and labels are carried along. Files are averaged;
+Object,Sequence,p0,p1,… True classes, folds and labels are carried along; a label that differs
+between the windows or files of one recording is left empty. Files are averaged;
 --weights has one weight for each, in their order. --type, --level and --joint are for
 recordings of the CORSMAL data set and write an official submission, -1 where something is not
 estimated.
