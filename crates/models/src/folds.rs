@@ -56,6 +56,7 @@ impl Folds {
     ) -> Result<Self> {
         let y = &classes.indices().to_vec();
         let target = (labels, classes);
+        let is_default = plan.is_none();
         let default = match groups.or_else(|| groups::usual(table, target)) {
             Some(column) => CvPlan::Group(column.into()),
             None => CvPlan::K(FOLDS),
@@ -110,16 +111,19 @@ impl Folds {
         if one {
             odd.push(ONE_RECORDING.into());
         }
-        if let (CvPlan::K(_), None) = (plan, named) {
+        if named.is_none() {
             let is_split = |column: &&str| {
                 let values = table.column(column);
                 !groups::is_target(table, column, target)
                     && values.is_ok_and(|values| splits_any(&outer, &values))
             };
+            let keeps = is_default || matches!(plan, CvPlan::K(_));
             odd.extend(groups::USUAL.into_iter().filter(is_split).map(|groups| {
-                format!(
-                    "rows of one {groups} are in both training and test: --groups {groups} keeps them together"
-                )
+                let so = match keeps {
+                    true => format!("--groups {groups} keeps them together"),
+                    false => format!("the scores are not those of a new {groups}"),
+                };
+                format!("rows of one {groups} are in both training and test: {so}")
             }));
         }
         odd.extend(copies::warning(table, &outer));
@@ -331,6 +335,22 @@ mod tests {
         assert_eq!(choice.groups(), containers);
         let said = folds(Some(&CvPlan::K(2)), None).warnings(&classes).join(" ");
         assert!(said.contains("--groups container"), "{said}");
+        // Of two usual columns the first is taken, whether or not it splits the other.
+        let both = table([
+            ("y", ["a", "b", "a", "b"]),
+            ("container", ["1", "1", "2", "2"]),
+            ("group", ["p", "q", "p", "q"]),
+            ("half", ["1", "2", "2", "1"]),
+        ]);
+        let (labels, classes) = both.classes("y").unwrap();
+        let said = |plan: Option<&CvPlan>| {
+            let found = Folds::new(plan, &both, None, (&labels, &classes), 0).unwrap();
+            found.warnings(&classes).join(" ")
+        };
+        let split = "rows of one group are in both training and test: --groups group";
+        assert!(said(None).contains(split), "{}", said(None));
+        let halves = said(Some(&CvPlan::Fold("half".into())));
+        assert!(halves.contains("the scores are not those of a new container"), "{halves}");
         // A recording that belongs to two groups is split by them.
         let odd = table([
             ("y", ["a", "b", "a", "b"]),

@@ -121,6 +121,14 @@ impl FormatRule {
         Self { fixed: true, ..self }
     }
 
+    /// The same for any sample rate, and for numbers of channels that change which channels are read, but
+    /// not how many features there are.
+    pub fn of_any_rate(self) -> Self {
+        let Self { channels, selected, fixed, .. } = self;
+        let channels = channels.filter(|_| !selected);
+        Self { sample_rates: None, channels, selected, fixed }
+    }
+
     /// The sample rates in Hz that are taken; `None` for any.
     pub fn sample_rates(&self) -> Option<&[u32]> {
         self.sample_rates.as_deref()

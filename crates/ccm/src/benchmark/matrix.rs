@@ -173,6 +173,21 @@ impl Kept {
     }
 }
 
+/// How many training recordings have no annotation of their action, in words, if there are any.
+pub(super) fn uncropped(training: &[Target], actions: &Actions) -> Option<String> {
+    let lacks = |target: &&Target| {
+        let key = target.recording.container.zip(target.recording.name);
+        key.is_none_or(|key| !actions.contains_key(&key))
+    };
+    let (lacking, all) = (training.iter().filter(lacks).count(), training.len());
+    (lacking > 0).then(|| {
+        format!(
+            "{lacking} of {all} training recordings have no annotated action (man_annotations.csv): the \
+             spectrogram baselines train on the whole recording, those of the paper on the action."
+        )
+    })
+}
+
 /// Recordings with their labels, cropped to their action where one is annotated.
 pub(super) fn inputs(root: &Path, targets: &[Target], actions: &Actions) -> Vec<Input> {
     let input = |target: &Target| {

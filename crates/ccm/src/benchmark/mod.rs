@@ -38,7 +38,7 @@ use crate::capacity::{require_own_tables, without_tables};
 use crate::dataset::{Container, DataSet, Subset};
 use crate::error::{CcmError, Result};
 use baselines::BaselineResult;
-use matrix::{Matrices, Store};
+use matrix::{Matrices, Store, uncropped};
 use names::file_name;
 use predicted::Predicted;
 use protocols::{Setting, Unit};
@@ -161,6 +161,12 @@ pub fn run(
     if let Some(without) = without_tables(&set.recordings, options.detections.as_deref()) {
         progress(&format!("warning: {without}"));
         cautions.push(format!("{without}."));
+    }
+    if options.baselines.iter().any(|baseline| baseline.features.cropped())
+        && let Some(caution) = uncropped(&rows.training, &set.actions()?)
+    {
+        progress(&format!("warning: {caution}"));
+        cautions.push(caution);
     }
     for caution in rows.tests.iter().filter_map(results::TestPart::unscored) {
         progress(&format!("warning: {caution}"));

@@ -26,7 +26,8 @@ pub struct PipelineArgs {
     /// is made on folds inside the training rows.
     #[arg(long, value_name = "KEY=V1,V2")]
     tune: Vec<String>,
-    /// Seed of the classifier or network and of shuffled folds; 0 by default.
+    /// Seed of the classifier or network and of shuffled folds; by default 0, or that of the network's
+    /// recipe.
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
 }

@@ -25,7 +25,7 @@ enum Action {
     ///
     /// Two layouts are known: the folder tree of 2020 (train/1/audio/s0_fi0_fu0_b0_l0_audio.wav) and
     /// the flat release of 2021 (train/audio/000000.wav with its annotation file). The exit code is 1
-    /// if something is odd or a container is incomplete.
+    /// if something is odd or a container is incomplete; containers of which nothing is there are listed.
     #[command(after_help = "Example:\n  corsmal-feat dataset check ~/CCM")]
     Check {
         /// Folder of the data set.

@@ -44,6 +44,15 @@ fn from_synthetic_recordings_to_the_report() {
     );
     assert!(said.contains("models/zcr-mfcc-knn-") && !said.contains("zcr-mfcc-rf"), "{said}");
 
+    // What is not cropped as the paper's were is said.
+    std::fs::remove_file(Path::new(data).join("man_annotations.csv")).unwrap();
+    let whole = out.join("whole");
+    let uncropped = ["--out", text(&whole), "-q", "--baselines", "spectrogram-knn"];
+    let said = lines(&run(&[&["benchmark", "--data", data], &uncropped[..]].concat()).stderr);
+    assert!(said.contains("training recordings have no annotated action"), "{said}");
+    let page = std::fs::read_to_string(whole.join("report.html")).unwrap();
+    assert!(page.contains("no annotated action"));
+
     // Its models take recordings, its features are training files.
     let (model, folder) =
         (out.join("models/zcr-mfcc-rf-corrected.model"), format!("{data}/train/2"));

@@ -95,6 +95,13 @@ fn recordings_of_another_rate_or_channel_count_are_rows_without_prediction() {
     let (code, lines, told) = t.classify(&[text(&slow), "--set", "signal.sample_rate=44100"]);
     assert_eq!((code, lines.contains(",ok,low,")), (Some(0), true), "{lines}{told}");
     assert_eq!(t.classify(&[text(&slow), "--any-rate"]).0, Some(0));
+    // Most of these have two channels, and took the prediction of the one that fits.
+    let second = t.path("1stereo.wav");
+    tone(&second, 44_100, 2, 320.0);
+    let (code, lines, told) =
+        t.classify(&[text(&stereo), text(&second), text(&slow), "--any-rate"]);
+    assert_eq!((code, lines.matches(",mismatch,").count()), (Some(1), 2), "{lines}{told}");
+    assert!(lines.contains("slow.wav,ok,low,"), "{lines}{told}");
     let (code, _, told) = t.classify(&[text(&slow), "--set", "signal.sample_rate=16000"]);
     assert_eq!(code, Some(2));
     assert!(told.contains("signal.sample_rate must be 44,100 Hz, as in training"), "{told}");

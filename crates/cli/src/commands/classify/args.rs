@@ -29,8 +29,8 @@ Examples:
 
 One line per recording: id, path, status, label columns of a manifest (the one that the model
 predicts is called true), predicted, and p_<label> for each class. Recordings that could not be
-read, or differ in sample rate or channels from those that the model was trained on, have a
-status other than ok and no prediction. With --window there is one line per window, with its start
+read, or differ in sample rate or channels from those that the model was trained on (where its
+features depend on that), have a status other than ok and no prediction. With --window there is one line per window, with its start
 and end in seconds, written as soon as the window is complete; memory does not grow with the stream.
 
 A network of `train --net` that takes windows, such as m4-type, gives one line per window, or one
@@ -57,8 +57,8 @@ pub struct Args {
     /// resamples them, signal.channels=mean mixes their channels.
     #[arg(long = "set", value_name = "KEY=VALUE", conflicts_with = "features")]
     pub(super) overrides: Vec<String>,
-    /// Take recordings of any sample rate and channel count as they are, whatever the model was
-    /// trained on.
+    /// Take recordings of any sample rate as they are, whatever the model was trained on; another
+    /// number of channels only where the number of features stays the same.
     #[arg(long)]
     pub(super) any_rate: bool,
     /// Call predictions unknown if their highest probability is below P.
@@ -161,11 +161,12 @@ impl Args {
         model: &Model,
         config: &serde_json::Value,
     ) -> Result<FormatRule, Failure> {
+        let rule = model.format_rule(config);
         if self.any_rate {
-            return Ok(FormatRule::default());
+            return Ok(rule.map(FormatRule::of_any_rate).unwrap_or_default());
         }
         let place = self.model.display();
-        model.format_rule(config).map_err(|e| Failure::new(format!("{place}: {e}")))
+        rule.map_err(|e| Failure::new(format!("{place}: {e}")))
     }
 }
 

@@ -43,8 +43,8 @@ use picture::{Picture, PictureArgs};
     what a model, network, checkpoint or capacity model was trained on; how many predictions (CSV,\n\
     JSON lines) there are of each class; and what submissions, capacities, detections, calibrations,\n\
     depth images, masks, configurations and ledgers contain.\n\n\
-    Clipping: at least three successive samples at the channel's own peak. Silence: share of 20 ms\n\
-    blocks below -60 dBFS. Exit code 1: some content cannot be read.")]
+    Clipping: at least three successive samples at the channel's own peak of -20 dBFS or more.\n\
+    Silence: share of 20 ms blocks below -60 dBFS. Exit code 1: some content cannot be read.")]
 pub struct Args {
     /// Files and folders, recognised by their content, not by their names.
     #[arg(required = true, value_name = "PATH")]
