@@ -34,14 +34,10 @@ def rows_of(batch: Any) -> list[Any]:
                 f"the column {name!r} must be called {name.lower()!r}; "
                 "a label must be called otherwise"
             )
-    lower = {name.lower() for name in names}
     # In an archive, `offset` is a place.
-    others = {"duration"} if PLACE[0] in names else {"offset", "duration"}
-    if "onset" in lower and others & lower and not {START, END} & lower:
-        raise ParameterError(
-            f"columns onset and {min(others & lower)}: the times of stretches are read from columns"
-            " start and end, in seconds; if these are labels, give them other names"
-        )
+    places = PLACE if PLACE[0] in names else ()
+    if refusal := _core.times_refusal([name for name in names if name not in places]):
+        raise ParameterError(refusal)
     if PATH not in names and BYTES not in names:
         raise ParameterError(f"batch needs a column path or bytes, but has only {', '.join(names)}")
 

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use corsmal_files::spelling;
 
 use crate::inputs::{Input, InputError, InputSource};
-use crate::survey::{headers, lengths};
+use crate::survey::{Length, headers, lengths};
 
 /// Column that holds the recording of a window or stretch: the group that folds keep together.
 pub const RECORDING: &str = "recording";
@@ -26,6 +26,39 @@ pub struct WindowSpan {
     pub window: f64,
     /// From the begin of one to that of the next.
     pub hop: f64,
+}
+
+/// Windows, and what has none.
+#[derive(Debug, Default)]
+pub struct Windows {
+    /// In the order of the recordings and of time.
+    pub inputs: Vec<Input>,
+    /// Recordings that were cut short, and stretches that end after their recording: how many, and of
+    /// the first one the id and what is missing.
+    cut_short: Missing,
+    beyond: Missing,
+}
+
+type Missing = Option<(usize, String)>;
+
+impl Windows {
+    /// What the user should know before the run.
+    pub fn warnings(&self) -> Vec<String> {
+        let told = |missing: &Missing, what: &str| {
+            let (number, first) = missing.as_ref()?;
+            let of = match number {
+                1 => String::new(),
+                number => format!(" (the first of {number} such {what})"),
+            };
+            Some(format!("{first}{of}: what is missing has no windows"))
+        };
+        let cut_short = told(&self.cut_short, "recordings");
+        cut_short.into_iter().chain(told(&self.beyond, "stretches")).collect()
+    }
+}
+
+fn note(missing: &mut Missing, what: impl FnOnce() -> String) {
+    missing.get_or_insert_with(|| (0, what())).0 += 1;
 }
 
 /// The same with a label `recording`, the path, where inputs are stretches of one file: folds keep them
@@ -83,7 +116,7 @@ pub fn into_windows(
     inputs: Vec<Input>,
     span: WindowSpan,
     stop: &Arc<AtomicBool>,
-) -> Result<Vec<Input>, InputError> {
+) -> Result<Windows, InputError> {
     if let Some(input) = inputs.iter().find(|i| i.labels.iter().any(|(name, _)| name == RECORDING))
     {
         let reason = format!(
@@ -97,7 +130,7 @@ pub fn into_windows(
     if stop.load(Ordering::Relaxed) {
         return Err(InputError::Stopped);
     }
-    let mut windows = Vec::new();
+    let mut windows = Windows::default();
     for ((input, header), length) in inputs.into_iter().zip(headers).zip(lengths) {
         if input.source.comes_once() {
             let name = match &input.source {
@@ -109,12 +142,12 @@ pub fn into_windows(
         }
         match header.zip(length) {
             Some((header, length)) => {
-                of_recording(&input, (header.sample_rate, length), span, &mut windows)?;
+                of_recording(&input, (header.sample_rate, &length), span, &mut windows)?;
             }
-            None => windows.push(labelled(&input, input.id.clone(), input.start, input.end)),
+            None => windows.inputs.push(labelled(&input, input.id.clone(), input.start, input.end)),
         }
     }
-    let mut ids: Vec<&str> = windows.iter().map(|input| input.id.as_str()).collect();
+    let mut ids: Vec<&str> = windows.inputs.iter().map(|input| input.id.as_str()).collect();
     ids.sort_unstable();
     match ids.windows(2).find(|pair| pair[0] == pair[1]) {
         None => Ok(windows),
@@ -127,26 +160,28 @@ pub fn into_windows(
 
 fn of_recording(
     input: &Input,
-    (sample_rate, there): (u32, u64),
+    (sample_rate, length): (u32, &Length),
     span: WindowSpan,
-    windows: &mut Vec<Input>,
+    windows: &mut Windows,
 ) -> Result<(), InputError> {
     let rate = f64::from(sample_rate);
     let frames = |seconds: f64| ((seconds * rate).round() as u64).max(1);
     let at = |seconds: f64| frame_at(seconds, rate);
     let base = input.start.map_or(0, at);
-    let end = input.end.map_or(there, at).min(there);
+    let (there, wanted) = (length.frames, input.end.map_or(u64::MAX, at));
+    let end = wanted.min(there);
     let (window, hop) = (frames(span.window), frames(span.hop));
     let count = match end.saturating_sub(base).checked_sub(window) {
         None => {
             // Shorter than a window.
             let id = format!("{}@{}", input.id, seconds(base, rate));
-            windows.push(labelled(input, id, input.start, input.end));
+            // Its row says what is missing.
+            windows.inputs.push(labelled(input, id, input.start, input.end));
             return Ok(());
         }
         Some(rest) => rest / hop + 1,
     };
-    if count + windows.len() as u64 > MOST {
+    if count + windows.inputs.len() as u64 > MOST {
         let reason = format!("more than {MOST} windows in all; use a longer hop");
         return Err(InputError::Window { id: input.id.clone(), reason });
     }
@@ -154,7 +189,16 @@ fn of_recording(
         let first = base + number * hop;
         let id = format!("{}@{}", input.id, seconds(first, rate));
         let (start, end) = (first as f64 / rate, (first + window) as f64 / rate);
-        windows.push(labelled(input, id, Some(start), Some(end)));
+        windows.inputs.push(labelled(input, id, Some(start), Some(end)));
+    }
+    match &length.cut_short {
+        _ if wanted <= there => {}
+        Some(repair) => note(&mut windows.cut_short, || format!("{}: {repair}", input.id)),
+        None if wanted < u64::MAX => note(&mut windows.beyond, || {
+            let (end, there) = (wanted as f64 / rate, there as f64 / rate);
+            format!("{}: the stretch ends at {end} s, its recording at {there} s", input.id)
+        }),
+        None => {}
     }
     Ok(())
 }

@@ -19,6 +19,7 @@ use serde_json::Value;
 
 use crate::inputs::cells::require_cells;
 use crate::inputs::error::InputError;
+use crate::inputs::times::{END, START, times_refusal};
 
 /// File name extensions of manifests, lower case.
 pub const EXTENSIONS: [&str; 3] = ["csv", "jsonl", "ndjson"];
@@ -30,8 +31,6 @@ pub const MAX_COLUMNS: usize = 4096;
 
 const PATH: &str = "path";
 pub(crate) const ID: &str = "id";
-const START: &str = "start";
-const END: &str = "end";
 
 /// One row of a manifest.
 #[derive(Debug, Clone, PartialEq)]
@@ -122,27 +121,11 @@ impl ManifestColumns {
         Ok(place)
     }
 
-    /// Refuses the names that annotations of events give to times: whole recordings would be computed. Gives
-    /// the places of both.
+    /// Refuses other names for the times of stretches. Gives the places of both columns.
     fn check_times(&self) -> Result<(), ([usize; 2], String)> {
-        let find = |name: &str| {
-            let named = self.places.iter().filter(|(k, _)| k.eq_ignore_ascii_case(name));
-            named.min_by_key(|(_, place)| **place)
-        };
-        match (find("onset"), find("offset").or(find("duration"))) {
-            (Some((onset, first)), Some((other, second)))
-                if find(START).is_none() && find(END).is_none() =>
-            {
-                let reason = format!(
-                    "columns {} and {}: the times of stretches are read from columns `{START}` and \
-                     `{END}`, in seconds; if these are labels, give them other names",
-                    quoted(onset),
-                    quoted(other)
-                );
-                Err(([*first, *second], reason))
-            }
-            _ => Ok(()),
-        }
+        let mut names = vec![""; self.places.len()];
+        self.places.iter().for_each(|(name, place)| names[*place] = name);
+        times_refusal(&names).map_or(Ok(()), Err)
     }
 
     /// Refuses more than so many rows should hold.

@@ -272,6 +272,11 @@ impl ProjectionConfig {
         serde_json::json!(self.keys)
     }
 
+    /// Its file.
+    pub(crate) fn file(&self) -> &Path {
+        Path::new(&self.keys.file)
+    }
+
     /// The projection.
     pub fn projection(&self) -> &Projection {
         &self.projection

@@ -5,7 +5,8 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use corsmal_audio::{AudioError, BlockSource};
+use corsmal_audio::{AudioError, BlockSource, Repair};
+use corsmal_files::outcome::{Outcome, Status};
 use rayon::prelude::*;
 
 use crate::config::{Channels, Config};
@@ -27,6 +28,17 @@ pub struct Header {
     pub frames: Option<u64>,
     /// Whether its reader can go to any frame.
     pub seekable: bool,
+    /// Frames that the header declares.
+    pub declared: Option<u64>,
+}
+
+/// How long a recording is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Length {
+    /// Frames that are there.
+    pub frames: u64,
+    /// Why there are no more, where more should be.
+    pub cut_short: Option<Repair>,
 }
 
 /// The header of each input, every file opened once; `None` for what comes once and for what cannot
@@ -65,18 +77,18 @@ fn again(input: &Input) -> Option<&InputSource> {
 fn of(source: &dyn BlockSource) -> Header {
     let (spec, seekable) = (source.spec(), source.seekable());
     let frames = source.most_frames().filter(|_| seekable);
-    let (sample_rate, channels) = (spec.sample_rate, spec.channels);
-    Header { sample_rate, channels, frames, seekable }
+    let (sample_rate, channels, declared) = (spec.sample_rate, spec.channels, spec.declared_frames);
+    Header { sample_rate, channels, frames, seekable, declared }
 }
 
-/// The frames of each input, those of every file counted once; `None` for what cannot be read to its
+/// The length of each input, the frames of every file counted once; `None` for what cannot be read to its
 /// end, which the run will say. `headers` are those of [`headers`]. Waiting for stores ends when `stop`
 /// is set.
 pub fn lengths(
     inputs: &[Input],
     headers: &[Option<Header>],
     stop: &Arc<AtomicBool>,
-) -> Vec<Option<u64>> {
+) -> Vec<Option<Length>> {
     let mut sources: Vec<(&InputSource, Header)> = inputs
         .iter()
         .zip(headers)
@@ -85,29 +97,37 @@ pub fn lengths(
     sources.sort_unstable_by_key(|(source, _)| *source);
     sources.dedup_by_key(|(source, _)| *source);
     let count = |(source, header): &(&InputSource, Header)| {
-        header.frames.or_else(|| count_frames(source, stop).ok())
+        let of_header = header.frames.map(|frames| {
+            let declared = header.declared.filter(|declared| *declared > frames);
+            let cut_short = declared.map(|_| Repair::Truncated { declared, actual: frames });
+            Length { frames, cut_short }
+        });
+        of_header.or_else(|| count_frames(source, stop).ok())
     };
-    let found: Vec<Option<u64>> = on_threads(false, || sources.par_iter().map(count).collect());
-    let known: HashMap<&InputSource, Option<u64>> =
+    let found: Vec<Option<Length>> = on_threads(false, || sources.par_iter().map(count).collect());
+    let known: HashMap<&InputSource, Option<Length>> =
         sources.into_iter().map(|(source, _)| source).zip(found).collect();
-    inputs.iter().map(|input| again(input).and_then(|s| known.get(s).copied()?)).collect()
+    inputs.iter().map(|input| again(input).and_then(|s| known.get(s).cloned()?)).collect()
 }
 
-/// Frames of a recording whose header does not say: decodes it.
+/// Length of a recording whose header does not say: decodes it.
 ///
 /// # Errors
 /// It cannot be read to its end.
-fn count_frames(source: &InputSource, stop: &Arc<AtomicBool>) -> Result<u64, AudioError> {
+fn count_frames(source: &InputSource, stop: &Arc<AtomicBool>) -> Result<Length, AudioError> {
     let mut source = source.open_until(stop)?;
     let channels = usize::from(source.spec().channels);
     let mut block = vec![0.0; (BLOCK / channels).max(1) * channels];
     let mut frames = 0;
     loop {
         match source.read(&mut block)? {
-            0 => return Ok(frames),
+            0 => break,
             read => frames += read as u64,
         }
     }
+    let mut repairs = source.health().repairs.iter();
+    let cut_short = repairs.find(|repair| matches!(repair, Repair::Truncated { .. })).cloned();
+    Ok(Length { frames, cut_short })
 }
 
 /// Whether recordings fit into one summary table.
@@ -201,6 +221,17 @@ impl Survey {
             ));
         }
         warnings
+    }
+
+    /// Whether an earlier run that came to this outcome had a table of the same width.
+    pub fn agrees(&self, outcome: &Outcome) -> bool {
+        let refusal = outcome.channels.and_then(|n| self.refusal(u16::try_from(n).ok()?));
+        match outcome.status {
+            Status::Mismatch if outcome.reason.ends_with(ONE_WIDTH) => {
+                refusal.as_ref() == Some(&outcome.reason)
+            }
+            status => refusal.is_none() || !status.has_features(),
+        }
     }
 
     /// Why a recording of so many channels does not fit into the table.

@@ -211,6 +211,13 @@ pub(crate) fn lengths(py: Python<'_>, rows: Vec<Row>) -> PyResult<Vec<Option<(u3
     Ok(found.into_iter().map(|header| header.and_then(known)).collect())
 }
 
+/// Why stretches with these columns would be others than meant.
+#[pyfunction]
+pub(crate) fn times_refusal(names: Vec<String>) -> Option<String> {
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    inputs::times_refusal(&names).map(|(_, reason)| reason)
+}
+
 /// Refuses the store of an object where nothing in it can be asked for.
 #[pyfunction]
 pub(crate) fn require_store(py: Python<'_>, name: &str) -> PyResult<()> {

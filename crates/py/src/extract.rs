@@ -140,7 +140,11 @@ pub(crate) fn extract(
         }
         let inputs = match span {
             None => name_recordings(found.inputs),
-            Some(span) => into_windows(found.inputs, span, stop).map_err(input_error)?,
+            Some(span) => {
+                let windows = into_windows(found.inputs, span, stop).map_err(input_error)?;
+                windows.warnings().iter().for_each(|warning| told.warning(warning));
+                windows.inputs
+            }
         };
         run::run(&inputs, &config, &options, &told, stop).map_err(|error| match error {
             run::RunError::Interrupted => interrupted(&error),

@@ -37,7 +37,9 @@ mod _core {
     use pyo3::prelude::*;
 
     #[pymodule_export]
-    use crate::batch::{PyRecordings, collect, is_stored, lengths, require_store, shown};
+    use crate::batch::{
+        PyRecordings, collect, is_stored, lengths, require_store, shown, times_refusal,
+    };
     #[pymodule_export]
     use crate::chroma::{chroma, chroma_filter, estimate_tuning, piptrack, pitch_tuning};
     #[pymodule_export]

@@ -67,10 +67,10 @@ pub struct Args {
     /// Process only the i-th of n parts of the inputs, counted from 0; `merge` joins the outputs.
     #[arg(long, value_name = "I/N", default_value = "0/1")]
     shard: Shard,
-    /// Continue an interrupted run.
-    #[arg(long, conflicts_with = "overwrite")]
+    /// Continue an interrupted run; with --overwrite, also one that was to replace an existing output.
+    #[arg(long)]
     resume: bool,
-    /// Replace an existing output and discard an interrupted run.
+    /// Replace an existing output and, without --resume, discard an interrupted run.
     #[arg(long)]
     overwrite: bool,
     /// Deflate the arrays of an .npz (smaller, much slower).
@@ -168,7 +168,11 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
                 Err(error @ InputError::Stopped) => {
                     return Err(Failure::interrupted(error.to_string()));
                 }
-                windows => windows?,
+                windows => {
+                    let windows = windows?;
+                    windows.warnings().iter().for_each(|warning| meter.warning(warning));
+                    windows.inputs
+                }
             }
         }
     };
@@ -212,6 +216,7 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
         meter.checked(inputs.len(), &config.hash());
         return Ok(ExitCode::SUCCESS);
     }
+    let again = if options.overwrite { "--overwrite --resume" } else { "--resume" };
     match run::run(&found, &config, &options, &meter, stop) {
         Ok(report) => {
             meter.finish(&report, &options.out);
@@ -221,13 +226,14 @@ fn extract(args: Args) -> Result<ExitCode, Failure> {
             }
             Ok(if report.failed() > 0 { ExitCode::from(FAILED_FILES) } else { ExitCode::SUCCESS })
         }
-        Err(error @ RunError::Interrupted) => {
-            Meter::stopped(args.log_format, "interrupted", &error.to_string());
+        Err(RunError::Interrupted) => {
+            let message = format!("interrupted; {again} continues the run");
+            Meter::stopped(args.log_format, "interrupted", &message);
             Ok(ExitCode::from(INTERRUPTED))
         }
         Err(error @ RunError::TooManyErrors { .. }) => {
             let message =
-                format!("{error}; repair them or allow more, then --resume continues the run");
+                format!("{error}; repair them or allow more, then {again} continues the run");
             Err(Failure::new(message))
         }
         Err(error) => Err(error.into()),

@@ -54,7 +54,11 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         Err(MergeError::Run(error @ RunError::Interrupted)) => {
             return Err(Failure::interrupted(error.to_string()));
         }
-        merged => merged?,
+        merged => {
+            if let Some(warning) = merged? {
+                eprintln!("warning: {warning}");
+            }
+        }
     }
     args.told.tell(
         || {

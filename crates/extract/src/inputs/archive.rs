@@ -15,13 +15,11 @@ use tar::{Archive, EntryType};
 
 use super::beside::{self, Entry};
 use super::error::InputError;
-use super::folder::has_extension;
+use super::folder::{ARCHIVE, has_extension};
 use super::member::{Fault, Member, Place};
 use super::stored::{self, Blocks, Pin, Purpose};
 use crate::manifest;
 
-/// File name extension, lower case.
-pub(super) const EXTENSION: &str = "tar";
 /// Ends of names of compressed archives, in which nothing can be read where it lies.
 const COMPRESSED: [&str; 6] = [".tar.gz", ".tgz", ".tar.bz2", ".tar.xz", ".tar.zst", ".tar.lz4"];
 /// Bytes of a block of an archive.
@@ -46,7 +44,7 @@ pub(super) struct Contents {
 
 /// Whether a file is an archive, by its name.
 pub(super) fn is_archive(path: &Path) -> bool {
-    has_extension(path, &[EXTENSION])
+    has_extension(path, &[ARCHIVE])
 }
 
 /// Why a file cannot be taken that is an archive by its name.

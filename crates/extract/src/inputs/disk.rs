@@ -33,7 +33,7 @@ impl Search<'_> {
         match std::fs::metadata(path) {
             Ok(meta) if meta.is_dir() => {
                 let (mut files, before) = (Vec::new(), self.skipped.len());
-                walk(path, &mut files, &mut self.skipped)?;
+                walk(path, &mut files, (&mut self.skipped, &mut self.archives))?;
                 if files.is_empty() {
                     return Err(no_audio(path, &self.skipped[before..]));
                 }
@@ -149,7 +149,7 @@ impl Search<'_> {
             self.find_archive(path, &Place::File(path.clone()))?;
         }
         for path in paths {
-            walk(&path, &mut files, &mut self.skipped)?;
+            walk(&path, &mut files, (&mut self.skipped, &mut self.archives))?;
         }
         if files.is_empty() && archives.is_empty() {
             return Err(no_audio(Path::new(pattern), &self.skipped[before..]));

@@ -8,11 +8,15 @@ use walkdir::WalkDir;
 
 use super::error::InputError;
 
-/// Appends the audio files at or below `path`, and to `skipped` those whose formats are not read.
+/// Extension of tar archives.
+pub(super) const ARCHIVE: &str = "tar";
+
+/// Appends the audio files at or below `path`, to `skipped` those whose formats are not read, and to
+/// `archives` the tars below it.
 pub(super) fn walk(
     path: &Path,
     files: &mut Vec<PathBuf>,
-    skipped: &mut Vec<PathBuf>,
+    (skipped, archives): (&mut Vec<PathBuf>, &mut Vec<PathBuf>),
 ) -> Result<(), InputError> {
     let is_audio = |path: &Path| has_extension(path, &corsmal_audio::EXTENSIONS);
     let visible = |entry: &walkdir::DirEntry| !is_hidden(entry);
@@ -23,8 +27,12 @@ pub(super) fn walk(
             }
             Ok(entry) => {
                 let is_other = has_extension(entry.path(), &corsmal_audio::OTHER_EXTENSIONS);
-                if entry.file_type().is_file() && is_other {
-                    skipped.push(entry.into_path());
+                match entry.file_type().is_file() {
+                    true if is_other => skipped.push(entry.into_path()),
+                    true if has_extension(entry.path(), &[ARCHIVE]) => {
+                        archives.push(entry.into_path())
+                    }
+                    _ => {}
                 }
             }
             Err(error) => {

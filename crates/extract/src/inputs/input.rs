@@ -70,6 +70,14 @@ impl InputSource {
         }
     }
 
+    /// The archive that holds it, where there is one.
+    pub(super) fn archive(&self) -> Option<PathBuf> {
+        match self {
+            Self::Member(member) => Some(member.archive.path()),
+            _ => None,
+        }
+    }
+
     /// The object that holds the bytes, where there is one.
     pub(crate) fn object(&self) -> Option<&Object> {
         match self {

@@ -31,11 +31,13 @@ mod member;
 mod objects;
 mod search;
 pub(crate) mod stored;
+pub(crate) mod times;
+mod twice;
 mod wildcard;
 
 use std::collections::{BTreeMap, HashSet};
 use std::ffi::OsStr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -48,6 +50,7 @@ pub(crate) use identities::Identities;
 pub use input::{Input, InputSource, list_hash};
 pub use member::{Fault, Member, Place};
 pub use stored::{Object, is_stored, object, require_store, shown};
+pub use times::times_refusal;
 
 /// What names stand for.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -57,13 +60,11 @@ pub struct Collected {
     /// Files in folders whose names are those of recordings, of formats that are not read, and
     /// metadata of macOS (`._x.wav`) wherever it is named.
     pub skipped: Vec<PathBuf>,
+    /// Tar archives in folders, which are read where they are named.
+    pub archives: Vec<PathBuf>,
     /// Archives without the blocks of zeros that end one: members may be missing.
     pub unended: Vec<PathBuf>,
 }
-
-/// What other programs call the ends of a stretch.
-const TIMES: [&str; 8] =
-    ["start_time", "end_time", "begin", "begin_time", "stop", "stop_time", "onset", "offset"];
 
 impl Collected {
     /// That labels look like the stretches that nothing is cut to.
@@ -72,21 +73,11 @@ impl Collected {
         if self.inputs.iter().any(|input| input.start.is_some() || input.end.is_some()) {
             return None;
         }
-        let names = first.labels.iter().map(|(name, _)| name.as_str());
-        let times: Vec<&str> = names.filter(|name| TIMES.contains(name)).collect();
-        let columns = match times.as_slice() {
-            [] => return None,
-            [only] => format!("the column {only} is a label"),
-            several => format!("the columns {} are labels", several.join(", ")),
-        };
-        Some(format!(
-            "{columns}, so whole recordings are read: to read stretches, use columns called \
-             `start` and `end`, in seconds"
-        ))
+        times::unused_times(first.labels.iter().map(|(name, _)| name.as_str()))
     }
 
-    /// A sentence about the files skipped, one about archives without an end and one about columns of
-    /// manifests that look like times and are none, if there are any.
+    /// Sentences about files skipped, archives in folders, archives without an end, labels that look like
+    /// times, and files given twice, as far as there are any.
     pub fn warning(&self) -> Option<String> {
         let unended = self.unended.first().map(|first| match self.unended.len() {
             1 => format!("{} has no end mark and may be cut short", first.display()),
@@ -95,8 +86,20 @@ impl Collected {
                 format!("{n} tars have no end mark and may be cut short: {first}, ...")
             }
         });
+        let archives = self.archives.first().map(|first| {
+            let (first, example) = (first.display(), "'FOLDER/*.tar'");
+            match self.archives.len() {
+                1 => format!("{first} is not read, because it lies in a folder: name it"),
+                n => format!("{n} tars in folders are not read, {first} for one: name them, such as {example}"),
+            }
+        });
         let told = told(&self.skipped).into_iter();
-        let sentences: Vec<String> = told.chain(unended).chain(self.unused_times()).collect();
+        let sentences: Vec<String> = told
+            .chain(archives)
+            .chain(unended)
+            .chain(self.unused_times())
+            .chain(twice::told(&self.inputs))
+            .collect();
         (!sentences.is_empty()).then(|| sentences.join("; "))
     }
 }
@@ -123,9 +126,18 @@ pub fn collect_until<S: AsRef<OsStr>>(
         return Err(InputError::Stopped);
     }
     searched?;
-    let Search { found, mut skipped, unended, .. } = search;
-    skipped.sort_unstable();
-    skipped.dedup();
+    let Search { found, mut skipped, mut archives, unended, .. } = search;
+    if !archives.is_empty() {
+        // Some may have been named as well.
+        let real = |path: &Path| path.canonicalize().unwrap_or(path.into());
+        let read: HashSet<PathBuf> = found.iter().filter_map(|f| f.source.archive()).collect();
+        let read: HashSet<PathBuf> = read.iter().map(|path| real(path)).collect();
+        archives.retain(|path| !read.contains(&real(path)));
+    }
+    for paths in [&mut skipped, &mut archives] {
+        paths.sort_unstable();
+        paths.dedup();
+    }
     // Where nothing but such files was named, the first of them says so.
     if let (true, Some(path)) = (found.is_empty(), skipped.first()) {
         return Err(no_audio(path, &[]));
@@ -164,5 +176,5 @@ pub fn collect_until<S: AsRef<OsStr>>(
             labels: labels.collect(),
         }
     });
-    Ok(Collected { inputs: inputs.collect(), skipped, unended })
+    Ok(Collected { inputs: inputs.collect(), skipped, archives, unended })
 }

@@ -133,6 +133,8 @@ impl Search<'_> {
             self.push(object, relative);
         } else if has_extension(&relative, &corsmal_audio::OTHER_EXTENSIONS) {
             self.skipped.push(object.to_string().into());
+        } else if archive::is_archive(&relative) {
+            self.archives.push(object.to_string().into());
         }
     }
 

@@ -16,19 +16,22 @@ use super::member::Place;
 pub(super) struct Search<'a> {
     pub(super) found: Vec<Found>,
     pub(super) skipped: Vec<PathBuf>,
+    pub(super) archives: Vec<PathBuf>,
     pub(super) unended: Vec<PathBuf>,
     pub(super) stop: &'a Arc<AtomicBool>,
 }
 
 impl<'a> Search<'a> {
     pub(super) fn new(stop: &'a Arc<AtomicBool>) -> Self {
-        Self { found: Vec::new(), skipped: Vec::new(), unended: Vec::new(), stop }
+        let (found, skipped) = (Vec::new(), Vec::new());
+        Self { found, skipped, archives: Vec::new(), unended: Vec::new(), stop }
     }
 
     /// Adds what another search has found.
     pub(super) fn append(&mut self, mut other: Self) {
         self.found.append(&mut other.found);
         self.skipped.append(&mut other.skipped);
+        self.archives.append(&mut other.archives);
         self.unended.append(&mut other.unended);
     }
 

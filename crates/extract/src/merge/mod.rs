@@ -20,7 +20,7 @@ use corsmal_files::table::Table;
 use serde::{Deserialize, Serialize};
 
 use crate::ledger::{Done, Header, Ledger, ledger_path};
-use crate::run::RunError;
+use crate::run::{RunError, mixed};
 
 use error::go_on;
 use order::{Piece, in_order, not_one_run};
@@ -56,7 +56,7 @@ impl Done for Merged {
 
 /// Merges all shards of a run, given in any order, one after the other. As in a run, `out` appears
 /// only when it is complete, nothing else writes it meanwhile, and what was interrupted can go on.
-/// `stop` ends the merge early, its ledger intact.
+/// `stop` ends the merge early, its ledger intact. Gives what is to be warned of.
 ///
 /// # Errors
 /// [`MergeError`] names the shard that does not fit.
@@ -65,7 +65,7 @@ pub fn merge(
     out: &Path,
     existing: Existing,
     stop: &AtomicBool,
-) -> Result<(), MergeError> {
+) -> Result<Option<String>, MergeError> {
     let mut format = OutputFormat::of_name(out, Compression::Stored)?;
     let out = &draft::destination(out);
     if shards.iter().any(|shard| shard == out || draft::same(shard, out)) {
@@ -101,7 +101,10 @@ pub fn merge(
     };
     let mut merge = Merge { ledger, shards: &shards, provenance: &provenance, format, stop };
     match merge.write(done) {
-        Ok(()) => Ok(merge.ledger.publish()?),
+        Ok(warning) => {
+            merge.ledger.publish()?;
+            Ok(warning)
+        }
         Err(error @ MergeError::Run(RunError::Interrupted)) => Err(error),
         Err(error) => {
             // The first error is the one that matters. A shard that does not fit never will.
@@ -121,8 +124,9 @@ struct Merge<'a> {
 }
 
 impl Merge<'_> {
-    /// Writes what the shards hold together; the arrays of those that are `done` are there.
-    fn write(&mut self, done: Vec<Merged>) -> Result<(), MergeError> {
+    /// Writes what the shards hold together; the arrays of those that are `done` are there. Gives what is
+    /// to be warned of.
+    fn write(&mut self, done: Vec<Merged>) -> Result<Option<String>, MergeError> {
         let (part, path) = self.ledger.part()?;
         let ready = done.len();
         let mut writer = match self.format {
@@ -178,11 +182,13 @@ impl Merge<'_> {
         match writer {
             Some(mut writer) => {
                 layout::write_table(&mut writer, &table, self.provenance)?;
-                Ok(writer.finish()?)
+                writer.finish()?;
             }
-            None if frames => self.write_frames(part, &path, &table),
-            None => Ok(parquet::write_over(part, &path, &table, self.provenance)?),
+            None if frames => self.write_frames(part, &path, &table)?,
+            None => parquet::write_over(part, &path, &table, self.provenance)?,
         }
+        // Each shard has warned of its own recordings at most.
+        Ok(mixed(table.outcomes()))
     }
 
     /// Writes the frames of all shards, grouped as those of one run.

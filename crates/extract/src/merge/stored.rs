@@ -22,7 +22,7 @@ pub fn merge(
     (out, work): (&Path, Option<&Path>),
     existing: Existing,
     stop: &Arc<AtomicBool>,
-) -> Result<(), MergeError> {
+) -> Result<Option<String>, MergeError> {
     if shards.iter().any(|shard| shard == out) {
         return Err(MergeError::IsShard { path: out.into() });
     }
@@ -64,8 +64,10 @@ pub fn merge(
     };
     // A result that was not sent is made again: its shards may be others by now.
     let local = if stored.file.exists() { Existing::Overwrite } else { existing };
-    super::merge(&here, &stored.file, local, stop).map_err(|e| in_stores(e, &here))?;
-    Ok(stored.publish(existing == Existing::Overwrite, stop)?)
+    let warning =
+        super::merge(&here, &stored.file, local, stop).map_err(|e| in_stores(e, &here))?;
+    stored.publish(existing == Existing::Overwrite, stop)?;
+    Ok(warning)
 }
 
 /// The error with the names of shards instead of their copies, which are gone by the time it is read.

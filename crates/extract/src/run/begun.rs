@@ -101,8 +101,9 @@ impl<'a> Begun<'a> {
             }
             return ending(report.resumed).send(report, stop).map(State::Done).map(Self);
         }
-        let (ledger, records) = if options.resume && !options.overwrite {
-            resume((inputs, stop), &out, &header, progress)?
+        let survey = Survey::of(all, config, stop);
+        let (ledger, records) = if options.resume {
+            resume((inputs, &survey, stop), &out, &header, progress)?
         } else {
             (Ledger::create(&out, &header)?, Vec::new())
         };
@@ -117,7 +118,6 @@ impl<'a> Begun<'a> {
         let resumed = records.len();
         let frames = config.summary.is_none();
         let output = Output::new(ledger, records, (inputs, all), (format, frames))?;
-        let survey = Survey::of(all, config, stop);
         survey.warnings().iter().for_each(|warning| progress.warning(warning));
         let ending = ending(resumed);
         Ok(Self(State::Open(Box::new(Open { inputs, config, survey, output, ending }))))
@@ -166,7 +166,7 @@ impl Ending<'_> {
 
 /// What an interrupted run has done of what is still the same.
 fn resume(
-    (inputs, stop): (&[Input], &Arc<AtomicBool>),
+    (inputs, survey, stop): (&[Input], &Survey, &Arc<AtomicBool>),
     out: &Path,
     header: &ledger::Header,
     progress: &dyn Progress,
@@ -198,6 +198,11 @@ fn resume(
         let same = record.outcome.identity == now;
         if !same {
             progress.warning(&format!("{id} has changed; the run continues from there"));
+        } else if !survey.agrees(&record.outcome) {
+            progress.warning(&format!(
+                "the number of channels that most recordings have has changed: {id} and what follows it are computed again"
+            ));
+            return false;
         } else if now == identity::STREAM && !unversioned.replace(true) {
             progress.warning(&format!(
                 "{id}: its server sends neither ETag nor Last-Modified, so it may have changed unnoticed; its features \

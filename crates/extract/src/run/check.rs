@@ -89,6 +89,10 @@ pub fn check(
         let why = format!("is the input {} itself", input.id);
         return Err(RunError::Format { path: out.clone(), why });
     }
+    if config.projection.as_ref().is_some_and(|projection| draft::same(projection.file(), out)) {
+        let why = "is the projection itself: give the output another name".into();
+        return Err(RunError::Format { path: out.clone(), why });
+    }
     let (text, hash) = (config.to_value().to_string(), config.hash());
     let provenance = Provenance::new(text, hash, list_hash(inputs), options.shard);
     if let (OutputFormat::Parquet, None) = (format, &config.summary) {
@@ -101,6 +105,11 @@ pub fn check(
         // What did not reach its store is sent, not made again.
         done = finished.report(out, out, stop).ok();
     }
+    let is_pending = Ledger::is_pending(out);
+    if options.overwrite && options.resume && !is_pending && done.is_none() && out.exists() {
+        // What an interrupted run was to replace may have been replaced.
+        done = finished.report(out, out, stop).ok();
+    }
     if !options.overwrite {
         if let Some(stored) = &stored
             && let Some(copy) = stored.present(stop)?
@@ -110,9 +119,12 @@ pub fn check(
             is_sent = true;
         } else if out.exists() && !(out.is_dir() && is_ours(out) && !partition::is_partitioned(out))
         {
-            done = Some(finished.report(out, out, stop)?);
+            done = Some(finished.report(out, out, stop).map_err(|error| match error {
+                RunError::Exists { path, why } if is_pending => RunError::Replaced { path, why },
+                error => error,
+            })?);
         }
-        if done.is_none() && !options.resume && Ledger::is_pending(out) {
+        if done.is_none() && !options.resume && is_pending {
             Ledger::require_idle(out)?;
             return Err(RunError::Pending { path: ledger::ledger_path(out) });
         }

@@ -22,6 +22,17 @@ pub enum RunError {
         /// What it is.
         why: String,
     },
+    /// The output is there, holds something else, and an interrupted run was to replace it.
+    #[error(
+        "{path} exists and {why}; an interrupted run was to replace it: --overwrite --resume continues that run, \
+         --overwrite starts again"
+    )]
+    Replaced {
+        /// The output.
+        path: PathBuf,
+        /// What it is.
+        why: String,
+    },
     /// An interrupted run is there.
     #[error(
         "{path} was left by an interrupted run; --resume continues it, --overwrite starts again"

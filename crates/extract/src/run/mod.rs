@@ -32,7 +32,7 @@ use output::Output;
 pub use begun::Begun;
 pub use check::{Checked, check};
 pub use error::RunError;
-use options::mixed;
+pub(crate) use options::mixed;
 pub use options::{MAX_JOBS, Progress, Quiet, RunOptions, RunReport};
 pub use recordings::{Batch, InOrder, Piece, Recorded, Recordings};
 pub use stored::{StoredOutput, fetch_to};

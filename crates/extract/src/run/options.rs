@@ -27,9 +27,9 @@ pub struct RunOptions {
     pub jobs: usize,
     /// Part of the inputs.
     pub shard: Shard,
-    /// Continue an interrupted run.
+    /// Continue an interrupted run, with `overwrite` also one that replaces an existing output.
     pub resume: bool,
-    /// Replace an existing output and forget an interrupted run.
+    /// Replace an existing output and, without `resume`, forget an interrupted run.
     pub overwrite: bool,
     /// Failed files after which to stop; `None` never stops.
     pub max_errors: Option<usize>,
@@ -54,7 +54,7 @@ impl RunReport {
 }
 
 /// That stretches of one recording are of several contents, in words: it was replaced during the run.
-pub(super) fn mixed(outcomes: &[Outcome]) -> Option<String> {
+pub(crate) fn mixed(outcomes: &[Outcome]) -> Option<String> {
     let mut seen: HashMap<&str, &str> = HashMap::new();
     let mut mixed = BTreeSet::new();
     for outcome in outcomes {

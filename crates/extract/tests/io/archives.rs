@@ -380,3 +380,18 @@ fn a_member_that_is_there_twice_is_named() {
         "{refused}"
     );
 }
+
+/// A folder with one recording beside tars was one recording, without a word.
+#[test]
+fn archives_in_folders_are_told() {
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("x.wav"), wav(1)).unwrap();
+    let tar = archive(&folder, "s.tar", &[("a.wav", &wav(2))]);
+    let found = collect(folder.path()).unwrap();
+    assert_eq!(ids(&found.inputs), ["x"]);
+    assert!(found.warning().unwrap().contains("s.tar is not read, because it lies in a folder"));
+    let respelt = folder.path().join(".").join("s.tar");
+    let found = inputs::collect(&[text(folder.path()), text(&respelt)]).unwrap();
+    assert_eq!((found.inputs.len(), found.warning()), (2, None));
+    assert_eq!(collect(&tar).unwrap().warning(), None);
+}

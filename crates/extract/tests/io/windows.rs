@@ -24,7 +24,9 @@ fn windows(bytes: &[u8]) -> Vec<Input> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("x");
     std::fs::write(&path, bytes).unwrap();
-    into_windows(vec![input(&path)], WindowSpan { window: 0.1, hop: 0.1 }, &Arc::default()).unwrap()
+    into_windows(vec![input(&path)], WindowSpan { window: 0.1, hop: 0.1 }, &Arc::default())
+        .unwrap()
+        .inputs
 }
 
 #[test]
@@ -85,7 +87,7 @@ fn windows_of_stretches_belong_to_their_file() {
         ..input(&path)
     };
     let cut = |inputs: Vec<Input>| {
-        into_windows(inputs, WindowSpan { window: 0.1, hop: 0.1 }, &Arc::default()).unwrap()
+        into_windows(inputs, WindowSpan { window: 0.1, hop: 0.1 }, &Arc::default()).unwrap().inputs
     };
     let windows = cut(vec![stretch("a", 0.0, 0.2), stretch("b", 0.3, 0.5)]);
     let recording = vec![("recording".to_string(), path.to_str().unwrap().to_string())];
@@ -250,4 +252,46 @@ fn a_start_of_the_signal_behind_a_stretch_is_said() {
     let reason = "signal.start and signal.end leave nothing of the stretch";
     assert_eq!(of(&["signal.start=0.3".into()], 0.2), ("empty", reason.into()));
     assert_eq!(of(&[], 0.100001), ("empty", "the stretch has no frame at 44100 Hz".into()));
+}
+
+/// Half of a recording was missing, and every window was ok.
+#[test]
+fn what_is_missing_of_recordings_has_no_windows_and_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.wav");
+    let spec = hound::WavSpec {
+        channels: 1,
+        sample_rate: 8000,
+        bits_per_sample: 16,
+        sample_format: hound::SampleFormat::Int,
+    };
+    let mut writer = hound::WavWriter::create(&path, spec).unwrap();
+    (0..8000).for_each(|i| writer.write_sample((i * i % 997) as i16).unwrap());
+    writer.finalize().unwrap();
+    let cut = |inputs: Vec<Input>| {
+        into_windows(inputs, WindowSpan { window: 0.1, hop: 0.1 }, &Arc::default()).unwrap()
+    };
+    let until = |end: f64| Input { id: "y".into(), end: Some(end), ..input(&path) };
+    assert!(cut(vec![input(&path), until(0.5)]).warnings().is_empty());
+    assert_eq!(
+        cut(vec![until(3.0), input(&path)]).warnings(),
+        ["y: the stretch ends at 3 s, its recording at 1 s: what is missing has no windows"]
+    );
+    let whole = std::fs::read(&path).unwrap();
+    std::fs::write(&path, &whole[..44 + 2 * 5000]).unwrap();
+    // What ends before the loss is complete.
+    assert!(cut(vec![until(0.5)]).warnings().is_empty());
+    let windows = cut(vec![input(&path), Input { id: "y".into(), ..input(&path) }]);
+    assert_eq!(windows.inputs.len(), 12);
+    assert_eq!(
+        windows.warnings(),
+        [
+            "x: the file ends after 5000 of 8000 frames (the first of 2 such recordings): what is missing has no windows"
+        ]
+    );
+    // Counted by decoding.
+    std::fs::write(&path, &MP3[..MP3.len() / 2]).unwrap();
+    let windows = cut(vec![input(&path)]);
+    let told = windows.warnings();
+    assert!(windows.inputs.len() > 1 && told[0].contains(" of 30000 frames"), "{told:?}");
 }
