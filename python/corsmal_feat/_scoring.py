@@ -223,7 +223,10 @@ def fuse(
         raise ParameterError("predictions must name at least one file")
     chosen = None if weights is None else [float(weight) for weight in weights]
     least = whole("least", least, 2**32)
-    return parse(_core.fuse(paths, chosen, vote, background, least))
+    fused, warnings = _core.fuse(paths, chosen, vote, background, least)
+    for told in warnings:
+        warn(told)
+    return parse(fused)
 
 
 @refuses

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use corsmal_ccm::predictions::{self, RecordingPredictions};
+use corsmal_ccm::fused;
 use corsmal_models::comparison::compare;
 use corsmal_models::dataset::{LabelSource, LabelledTable, MemberNames};
 use corsmal_models::labels::Labels;
@@ -106,7 +106,7 @@ pub(crate) fn cross_validate(
     })
 }
 
-/// The fused predictions as CSV.
+/// The fused predictions as CSV, and what is to be warned of.
 #[pyfunction]
 pub(crate) fn fuse(
     py: Python<'_>,
@@ -115,49 +115,35 @@ pub(crate) fn fuse(
     vote: Option<&str>,
     background: Option<&str>,
     least: usize,
-) -> PyResult<String> {
+) -> PyResult<(String, Vec<String>)> {
     if background.is_some() && matches!(vote, None | Some("mean")) {
         return Err(value_error("background needs vote = majority"));
     }
     if background.is_none() && least != 1 {
         return Err(value_error("least needs background, the class that it counts against"));
     }
+    if !matches!(vote, None | Some("mean" | "majority")) {
+        let vote = vote.unwrap_or_default();
+        return Err(value_error(format!("vote must be majority or mean, not {vote}")));
+    }
     let rule = |labels: &[String]| match (vote, background) {
         (None, _) => Ok(None),
         (Some("mean"), _) => Ok(Some(VotingRule::Mean)),
-        (Some("majority"), None) => Ok(Some(VotingRule::Majority(None))),
-        (Some("majority"), Some(label)) => {
-            let labels = Labels::new(labels.to_vec()).map_err(value_error)?;
-            VotingRule::majority_over(label, least, &labels).map(Some).map_err(value_error)
+        (Some(_), None) => Ok(Some(VotingRule::Majority(None))),
+        (Some(_), Some(label)) => {
+            let labels = Labels::new(labels.to_vec()).map_err(|e| e.to_string())?;
+            VotingRule::majority_over(label, least, &labels).map(Some).map_err(|e| e.to_string())
         }
-        (Some(other), _) => Err(value_error(format!("vote must be majority or mean, not {other}"))),
     };
-    let mut tables = Vec::with_capacity(paths.len());
-    for path in &paths {
-        let table = compute(py, || PredictionTable::read(path))?.map_err(value_error)?;
-        tables.push(match rule(&table.labels)? {
-            Some(rule) => {
-                let windows = table.windows_by_recording().map_err(value_error)?;
-                let windows = predictions::named(windows).map_err(value_error)?;
-                windows.vote(rule).map_err(value_error)?
-            }
-            None => predictions::named(table).map_err(value_error)?,
-        });
-    }
-    let averaged = tables.len() != 1 || weights.is_some();
+    let averaged = paths.len() != 1 || weights.is_some();
     if averaged && background.is_some() {
         return Err(value_error(
             "background works on the windows of one file: it cannot be combined with an average of files",
         ));
     }
-    let fused = if averaged {
-        RecordingPredictions::average(&tables, weights.as_deref()).map_err(value_error)?
-    } else {
-        let table = tables.remove(0);
-        table.check_once_each().map_err(value_error)?;
-        table.of_recordings()
-    };
-    csv(fused.to_csv())
+    let fused = compute(py, || fused::fuse(&paths, rule, weights.as_deref()))?;
+    let fused = fused.map_err(value_error)?;
+    Ok((csv(fused.table.to_csv())?, fused.warnings))
 }
 
 /// McNemar's test and bootstrap intervals, as JSON.

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
-use corsmal_ccm::predictions::{self, RecordingPredictions};
+use corsmal_ccm::fused;
+use corsmal_ccm::predictions::RecordingPredictions;
 use corsmal_models::labels::Labels;
-use corsmal_models::predictions::PredictionTable;
 use serde_json::json;
 
 use crate::args::{Told, VoteArgs};
@@ -134,34 +134,13 @@ impl Args {
         if paths.len() > 1 || weights.is_some() {
             self.vote.refuse_background("an average of files")?;
         }
-        let mut tables = Vec::with_capacity(paths.len());
-        for path in paths {
-            let mut table = PredictionTable::read(path)?;
-            let rule = self.vote.rule(&Labels::new(table.labels.clone())?)?;
-            if rule.is_some() {
-                table = table.windows_by_recording()?;
-                if table.check_once_each().is_ok() {
-                    eprintln!(
-                        "warning: {}: each id has one line, so there is nothing to vote on",
-                        path.display()
-                    );
-                }
-            }
-            let mut table = predictions::named(table)?;
-            if let Some(rule) = rule {
-                table = table.vote(rule)?;
-            }
-            tables.push(table);
-        }
-        match (tables.len(), weights) {
-            // Votes stand as they are: their shares may have another maximum.
-            (1, None) => {
-                let table = tables.remove(0);
-                table.check_once_each()?;
-                Ok(table.of_recordings())
-            }
-            _ => Ok(RecordingPredictions::average(&tables, weights)?),
-        }
+        let rule = |labels: &[String]| {
+            let rule = Labels::new(labels.to_vec()).map_err(Failure::from);
+            rule.and_then(|labels| self.vote.rule(&labels)).map_err(|failure| failure.to_string())
+        };
+        let fused = fused::fuse(paths, rule, weights)?;
+        fused.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+        Ok(fused.table)
     }
 }
 

@@ -40,6 +40,10 @@ pub fn run(args: &Args) -> Result<ExitCode, Failure> {
     let joint = fused(&args.joint, &args.weights)?;
     let kind = fused(&args.kind, &args.type_weights)?;
     let level = fused(&args.level, &args.level_weights)?;
+    let tables: Vec<_> = [&kind, &level].into_iter().flatten().collect();
+    if let Some(doubt) = corsmal_ccm::fused::doubt(&tables) {
+        eprintln!("warning: {doubt}");
+    }
     for table in kind.iter().filter(|table| table.labels == ["0", "1", "2"]) {
         eprintln!(
             "warning: {}: the classes of the type are 0, 1 and 2, without 3 (water): is this a \
