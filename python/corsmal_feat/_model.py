@@ -195,6 +195,9 @@ class TrainedModel:
         for path, outcome in zip(different, found.outcomes, strict=True):
             if outcome["status"] not in GOOD:
                 raise DecodeError(f"{path}: {outcome['status']}: {outcome['reason']}")
+            if repairs := ", ".join(outcome.get("repairs", ())):
+                reason = f": {outcome['reason']}" if outcome["reason"] else ""
+                warn(f"{path}: repaired ({repairs}){reason}")
         self._check_heard(found.outcomes, any_rate)
         if found.summary is None or len(found.names) != self.n_features_in_:
             raise ParameterError(

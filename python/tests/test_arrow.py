@@ -243,7 +243,7 @@ def test_jobs_that_cannot_be(recordings: list[Path]):
     refused("rename it", batch.append_column("status", batch["id"]))
     refused("must be called 'start'", batch.append_column("Start", batch["id"]))
     onset = batch.append_column("onset", batch["id"])
-    refused("read from columns start and end", onset.append_column("offset", batch["id"]))
+    refused("read from columns `start` and `end`", onset.append_column("offset", batch["id"]))
     refused("two columns with the same name", batch.append_column("id", batch["id"]))
     refused("must begin with one of s3://", pa.RecordBatch.from_pydict({"path": ["ftp://b/x.wav"]}))
     refused(

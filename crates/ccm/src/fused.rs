@@ -49,6 +49,16 @@ pub fn fuse(
             None => table,
         });
     }
+    let (with, without): (Vec<_>, Vec<_>) =
+        tables.iter().partition(|table| table.held_out_folds().is_some());
+    if let ([with, ..], [without, ..]) = (with.as_slice(), without.as_slice()) {
+        warnings.push(format!(
+            "{} has folds and {} has none: their fusion looks too good if a classifier was trained on the rows that it \
+             predicts",
+            with.path.display(),
+            without.path.display()
+        ));
+    }
     check_alike(&tables)?;
     warnings.extend(doubt(&tables.iter().collect::<Vec<_>>()));
     let table = match (tables.len(), weights) {

@@ -30,7 +30,7 @@ pub struct Folds {
     pub description: String,
     /// the folds scored
     pub outer: Vec<Fold>,
-    /// what is never split, one name per row
+    /// never split, one name per row
     groups: Option<Vec<String>>,
     /// what is odd about them, in words
     odd: Vec<String>,
@@ -67,6 +67,7 @@ impl Folds {
             groups::recordings(table, target).filter(|_| !matches!(plan, CvPlan::Lists(_)));
         let groups = named.or(match plan {
             CvPlan::Group(column) => Some(column),
+            CvPlan::Fold(folds) => groups::kept(table, target, folds).or(recordings),
             _ => recordings,
         });
         let column = match plan {
@@ -99,7 +100,8 @@ impl Folds {
             }
             _ => parts,
         };
-        if let (None, CvPlan::Group(_), Some(recordings)) = (named, plan, recordings) {
+        let is_finer = named.is_none() && matches!(plan, CvPlan::Group(_) | CvPlan::Fold(_));
+        if let Some(recordings) = recordings.filter(|_| is_finer) {
             let values = groups::values(table, recordings, ELSE)?;
             refuse_split(&outer, &values, (plan, recordings), false)?;
         }

@@ -64,9 +64,14 @@ impl TrainedOn {
         let every_channel = used["signal"]["channels"] == "all" && !averaged;
         let own_rate = rate(used) == 0.0;
         let rates = &self.sample_rates;
-        let known = own_rate || is_resampled_alike(own, used);
-        if !known && !rates.iter().any(|r| f64::from(*r) == rate(used)) {
-            let trained = rates.iter().map(|rate| hertz(*rate)).collect::<Vec<_>>().join(", ");
+        // The rates of files say nothing where all were resampled.
+        let trained = match rate(own) {
+            0.0 => rates.clone(),
+            resampled => vec![resampled as u32],
+        };
+        let is_known = trained.iter().any(|r| f64::from(*r) == rate(used));
+        if !is_known && !(own_rate && rate(own) == 0.0) {
+            let trained = trained.iter().map(|rate| hertz(*rate)).collect::<Vec<_>>().join(", ");
             return Err(OtherRate { rate: rate(used), trained });
         }
         // One channel of eight is another signal than the one channel of a mono recording. Whoever

@@ -1,5 +1,7 @@
 //! Columns whose values name groups of rows that belong together.
 
+use std::collections::HashMap;
+
 use crate::dataset::{LabelledTable, Result};
 use crate::error::ModelError;
 use crate::labels::{Labels, is_missing, missing};
@@ -18,13 +20,34 @@ pub fn usual(table: &LabelledTable, target: (&Labels, &Classes)) -> Option<&'sta
     columns.find(|column| are_several(table, column) && !is_target(table, column, target))
 }
 
-/// The column of recordings that rows are parts of, such as windows: there are several, and it is not the target.
-pub(crate) fn recordings(
+/// The column of recordings that rows are parts of, such as windows: there are several, and it is not the
+/// target. In a file of another program, ids that rows share are such a column.
+pub(crate) fn recordings<'t>(
+    table: &'t LabelledTable,
+    target: (&Labels, &Classes),
+) -> Option<&'t str> {
+    let mut columns = std::iter::once(RECORDING).chain(table.shared_ids());
+    columns.find(|column| are_several(table, column) && !is_target(table, column, target))
+}
+
+/// The first usual column of groups that folds in the column `folds` keep whole: it has several, and is not
+/// the target.
+pub(crate) fn kept(
     table: &LabelledTable,
     target: (&Labels, &Classes),
+    folds: &str,
 ) -> Option<&'static str> {
-    let found = are_several(table, RECORDING) && !is_target(table, RECORDING, target);
-    found.then_some(RECORDING)
+    let folds = table.column(folds).ok()?;
+    let is_kept = |column: &&str| {
+        let Ok(values) = table.column(column) else { return false };
+        let mut fold_of = HashMap::new();
+        let mut rows = values.iter().zip(&folds);
+        missing(&values) == 0
+            && are_several(table, column)
+            && !is_target(table, column, target)
+            && rows.all(|(value, fold)| fold_of.insert(value, fold).is_none_or(|old| old == fold))
+    };
+    USUAL.into_iter().find(is_kept)
 }
 
 /// Whether a column has several values.

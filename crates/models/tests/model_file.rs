@@ -131,6 +131,15 @@ fn a_model_knows_which_recordings_it_may_be_applied_to() {
         model.format_rule(&config(16_000.0, "all", false)),
         Err(ModelFileError::Rate(_))
     ));
+    // Where all were resampled, the rates of files say nothing: features at them are others.
+    let low = config(16_000.0, "mean", false);
+    let formats = [(Some(44_100), Some(1)), (Some(44_100), Some(1))];
+    let resampled = with(TrainedOn::of(formats), low.clone());
+    assert!(resampled.format_rule(&low).unwrap().check(Some(8000), Some(1)).is_ok());
+    for other in [44_100.0, 0.0] {
+        let refused = resampled.format_rule(&config(other, "mean", false)).unwrap_err().to_string();
+        assert!(refused.contains("must be 16,000 Hz, as in training"), "{refused}");
+    }
     // A model of version 0.1.0 matters only where recordings keep their own rate.
     let old = with(None, own.clone());
     assert!(matches!(old.format_rule(&own), Err(ModelFileError::FormatUnknown { .. })));

@@ -118,12 +118,22 @@ fn cross_validate(args: &Args) -> Result<ExitCode, Failure> {
         output::write(path, &predictions.to_csv()?)?;
     }
     let others = (1..args.seeds).map(|more| args.pipeline.seed().wrapping_add(more));
+    let mut is_seeded = false;
     let others = others.map(|seed| {
         let candidates = args.pipeline.candidates_with(seed)?;
         let found = validate(&table, &target, candidates, plan, seed)?;
+        is_seeded |= found.candidates != validation.candidates
+            || found.folds.outer != validation.folds.outer
+            || found.candidates.len() > 1 && found.folds.groups().is_none();
         Ok((seed, found.result.pooled))
     });
     let others = others.collect::<Result<Vec<_>, Failure>>()?;
+    if args.seeds > 1 && !is_seeded {
+        eprintln!(
+            "warning: --seeds {}: neither the folds nor the classifier take the seed, so all runs are the same",
+            args.seeds
+        );
+    }
     let all_seeds = Seeds::of(args.pipeline.seed(), &validation.result.pooled, &others);
     if args.json {
         let output = Output { validation: &validation, seeds: all_seeds };
@@ -223,6 +233,7 @@ fn report(
         predictions,
         scores: &validation.held_out,
         seeds,
+        warnings: table.doubts().into_iter().chain(validation.warnings.clone()).collect(),
         facts: vec![
             Fact::new(
                 "Rows and features",
@@ -313,6 +324,7 @@ fn validate_network(args: &Args, name: &str) -> Result<ExitCode, Failure> {
             predictions: &predictions,
             scores: &scores,
             seeds: &[],
+            warnings: found.folds.warnings(&found.classes),
             facts: std::iter::once(Fact::new("Network", name))
                 .chain(found.caution.map(|caution| Fact::new("Caution", caution)))
                 .collect(),

@@ -45,6 +45,8 @@ pub struct HeldOut<'a> {
     pub scores: &'a ClassReport,
     /// scores with other seeds
     pub seeds: &'a [(u32, Scores)],
+    /// what was warned of
+    pub warnings: Vec<String>,
     /// what was trained
     pub facts: Vec<Fact>,
     /// nothing but warnings
@@ -92,7 +94,7 @@ impl HeldOut<'_> {
         }
         study.facts.extend(self.facts);
         study.facts.push(Fact::new("Held out", &self.folds.description));
-        let cautions = self.folds.warnings(self.classes).into_iter();
+        let cautions = self.warnings.into_iter();
         study.facts.extend(cautions.chain(left_out).map(|caution| Fact::new("Caution", caution)));
         if !self.table.config_hash.is_empty() {
             study.facts.push(Fact::new("Feature configuration", &self.table.config_hash));

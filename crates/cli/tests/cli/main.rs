@@ -16,6 +16,7 @@ mod formats;
 mod fusion;
 #[cfg(feature = "nets")]
 mod hearing;
+mod held_out;
 mod hostile;
 mod inspect;
 mod inspect_kinds;

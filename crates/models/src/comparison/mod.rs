@@ -249,7 +249,7 @@ pub fn compare(
             "no groups are drawn by {column:?}: it has a single value, or another one in each row, or it is the target"
         ));
     }
-    let (folds, others) = (first.column("fold"), second.column("fold"));
+    let (folds, others) = (first.held_out_folds(), second.held_out_folds());
     let folds_differ = match (&folds, &others) {
         (Some(folds), Some(others)) => {
             let mut pairs = first.rows.iter().zip(folds);

@@ -131,6 +131,12 @@ impl LabelFile {
         Ok(Self { path: path.into(), key, columns, rows, stems })
     }
 
+    /// A recording that is not named by a whole number, if there is one: the first by its name.
+    pub(super) fn other_than_numbers(&self) -> Option<&str> {
+        let names = self.rows.keys().map(String::as_str);
+        names.filter(|name| name.parse::<u64>().is_err()).min()
+    }
+
     /// Label columns in the order of these recordings, given as (id, path), of which each must have
     /// its line. Says, too, if lines have no recording, but for those that `failed` extraction: the
     /// labels may be those of a whole data set, or recordings may be missing.

@@ -4,6 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use corsmal_files::outcome::Outcome;
+use corsmal_files::quote::quoted;
 use corsmal_files::spelling;
 use corsmal_files::table::{ID_NAMES, Table};
 use linfa::DatasetBase;
@@ -14,7 +15,7 @@ use super::error::{DatasetError, Result};
 use super::ids::not_an_id;
 use super::label_file::{LabelFile, LabelSource};
 use crate::formats::TrainedOn;
-use crate::labels::{Labels, require_few};
+use crate::labels::{Labels, missing, require_few};
 use crate::targets::Classes;
 
 /// What the column `joint` is put together from, where there is no such column.
@@ -136,6 +137,17 @@ impl LabelledTable {
                     ));
                 }
                 let file = LabelFile::read(path, key.as_deref())?;
+                // `39.wav` is not the row 39.
+                if let Some(name) = file.other_than_numbers().filter(|_| self.numbered) {
+                    return Err(DatasetError::content(
+                        &self.path,
+                        format!(
+                            "its rows are only numbered, and {} names recordings, such as {}: --ids names the ids",
+                            path.display(),
+                            quoted(name)
+                        ),
+                    ));
+                }
                 let pairs = |with_features: bool| -> Vec<(&str, &str)> {
                     let of = |o: &&Outcome| o.status.has_features() == with_features;
                     let wanted = self.outcomes.iter().filter(of);
@@ -160,6 +172,15 @@ impl LabelledTable {
         }
         self.columns.splice(0..0, columns);
         Ok(hidden)
+    }
+
+    /// The column of ids that several rows share, where rows are numbered instead.
+    pub(crate) fn shared_ids(&self) -> Option<&'static str> {
+        let is_shared = |name: &&str| {
+            let column = self.columns.iter().find(|(column, _)| column == name);
+            column.is_some_and(|(_, ids)| missing(ids) == 0)
+        };
+        ID_NAMES.into_iter().filter(|_| self.numbered).find(is_shared)
     }
 
     /// Why what looks like ids is none, where rows are numbered instead.

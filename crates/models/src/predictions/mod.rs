@@ -165,6 +165,12 @@ impl<K> PredictionTable<K> {
         Some(self.rows.iter().map(|row| row.cells[at].as_str()).collect())
     }
 
+    /// The folds that held the lines out. Beside `status`, which `classify` writes, `fold` is a label of the
+    /// recordings.
+    pub fn held_out_folds(&self) -> Option<Vec<&str>> {
+        self.column("fold").filter(|_| self.column(STATUS).is_none())
+    }
+
     /// The true class of each line as text: of the column named, or of one called `true`.
     ///
     /// # Errors
