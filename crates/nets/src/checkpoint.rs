@@ -113,10 +113,13 @@ pub(crate) fn save(
         .map_err(|source| WeightsError::Io { path: path.into(), source })
 }
 
-/// Goes on from a file, where there is one.
+/// Most steps of a training: beyond them a share of it would not be exact.
+const MOST_STEPS: u64 = 1 << f64::MANTISSA_DIGITS;
+
+/// Goes on from a file, where there is one, with a training of so many `epochs`.
 pub(crate) fn resume(
     path: &Path,
-    key: &str,
+    (key, epochs): (&str, usize),
     trainer: &mut Trainer<'_>,
 ) -> Result<(Vec<Epoch>, Best), WeightsError> {
     if !path.exists() {
@@ -136,6 +139,15 @@ pub(crate) fn resume(
              it, or give another file"
                 .into(),
         ));
+    }
+    let is_possible = text.epochs.len() <= epochs
+        && text.steps <= MOST_STEPS
+        && text.best.is_none_or(|(_, epoch)| epoch < text.epochs.len());
+    if !is_possible {
+        let (done, steps) = (text.epochs.len(), text.steps);
+        return Err(content(format!(
+            "the checkpoint has {done} of {epochs} epochs and {steps} steps, which cannot be; remove it"
+        )));
     }
     let state = weights::from_safetensors(&bytes).map_err(content)?;
     let damaged = |reason| content(format!("the checkpoint is {reason}; remove it"));

@@ -57,7 +57,7 @@ pub(crate) fn run(
     let place = checkpoint.zip(key.as_deref());
     let mut trainer = Trainer::new(network, settings);
     let (mut epochs, mut best) = match place {
-        Some((path, key)) => checkpoint::resume(path, key, &mut trainer)?,
+        Some((path, key)) => checkpoint::resume(path, (key, recipe.epochs), &mut trainer)?,
         None => (Vec::new(), None),
     };
     let resumed = epochs.len();
