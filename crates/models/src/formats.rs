@@ -69,8 +69,11 @@ impl TrainedOn {
             0.0 => rates.clone(),
             resampled => vec![resampled as u32],
         };
-        let is_known = trained.iter().any(|r| f64::from(*r) == rate(used));
-        if !is_known && !(own_rate && rate(own) == 0.0) {
+        let is_known = match own_rate {
+            true => rate(own) == 0.0,
+            false => trained.iter().any(|r| f64::from(*r) == rate(used)),
+        };
+        if !is_known {
             let trained = trained.iter().map(|rate| hertz(*rate)).collect::<Vec<_>>().join(", ");
             return Err(OtherRate { rate: rate(used), trained });
         }
