@@ -27,6 +27,12 @@ pub enum SystemError {
         /// what it takes
         takes: &'static str,
     },
+    /// A model that does not say on which recordings it was trained.
+    #[error("the model is damaged: trained_on, the formats of its recordings: {reason}")]
+    TrainedOn {
+        /// what is wrong
+        reason: serde_json::Error,
+    },
     /// A network that takes something else.
     #[error("{network} takes {takes}, not pictures")]
     TakesNoPictures {

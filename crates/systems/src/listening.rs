@@ -116,7 +116,8 @@ impl<'a> Listener<'a> {
             return Err(ConfigError::key("signal.sample_rate", message).into());
         }
         let trained: Option<TrainedOn> =
-            serde_json::from_value(header.provenance["trained_on"].clone()).unwrap_or_default();
+            serde_json::from_value(header.provenance["trained_on"].clone())
+                .map_err(|reason| SystemError::TrainedOn { reason })?;
         let hears_short = front_end.windows.is_none_or(|windows| windows.fill.is_some());
         let lengths = trained.as_ref().and_then(|trained| trained.seconds).filter(|_| hears_short);
         let formats = match trained.filter(|_| formats == Formats::AsTrained) {

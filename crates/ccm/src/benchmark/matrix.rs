@@ -173,19 +173,29 @@ impl Kept {
     }
 }
 
-/// How many training recordings have no annotation of their action, in words, if there are any.
-pub(super) fn uncropped(training: &[Target], actions: &Actions) -> Option<String> {
-    let lacks = |target: &&Target| {
+/// How many training recordings have no annotation of their action, or one behind their end, in words.
+pub(super) fn uncropped(training: &[Target], actions: &Actions) -> Vec<String> {
+    let action = |target: &&Target| {
         let key = target.recording.container.zip(target.recording.name);
-        key.is_none_or(|key| !actions.contains_key(&key))
+        key.and_then(|key| actions.get(&key).copied())
     };
-    let (lacking, all) = (training.iter().filter(lacks).count(), training.len());
-    (lacking > 0).then(|| {
-        format!(
-            "{lacking} of {all} training recordings have no annotated action (man_annotations.csv): the \
-             spectrogram baselines train on the whole recording, those of the paper on the action."
-        )
-    })
+    let is_beyond = |target: &&Target| {
+        action(target)
+            .flatten()
+            .is_some_and(|(start, _)| !begins_inside(&target.recording.path, start))
+    };
+    let lacking = training.iter().filter(|target| action(target).is_none()).count();
+    let (beyond, all) = (training.iter().filter(is_beyond).count(), training.len());
+    let told = |number: usize, what: &str| {
+        (number > 0).then(|| {
+            format!(
+                "{number} of {all} training recordings have {what} (man_annotations.csv): the spectrogram baselines \
+                 train on the whole recording, those of the paper on the action."
+            )
+        })
+    };
+    let beyond = told(beyond, "an annotated action that begins after their end, in seconds");
+    told(lacking, "no annotated action").into_iter().chain(beyond).collect()
 }
 
 /// Recordings with their labels, cropped to their action where one is annotated.

@@ -61,6 +61,17 @@ impl CapacityTable {
     /// What makes the training scores too good.
     fn caution(&self) -> Option<String> {
         let trained = self.learned_from.iter().copied().filter_map(Container::new);
+        if self.own.is_none()
+            && let Some(method) =
+                crate::capacity::method_of(&self.path).filter(|method| method.learns())
+        {
+            return Some(format!(
+                "The table of {} is of {}, which learns: if its model was trained on containers of the training part, \
+                 its scores on them are too good. Those on the test parts are not affected.",
+                self.name,
+                method.name()
+            ));
+        }
         let trained: Vec<String> = trained
             .filter(|container| container.subset() == Subset::Training)
             .map(|container| format!("C{}", container.number()))
@@ -162,11 +173,11 @@ pub fn run(
         progress(&format!("warning: {without}"));
         cautions.push(format!("{without}."));
     }
-    if options.baselines.iter().any(|baseline| baseline.features.cropped())
-        && let Some(caution) = uncropped(&rows.training, &set.actions()?)
-    {
-        progress(&format!("warning: {caution}"));
-        cautions.push(caution);
+    if options.baselines.iter().any(|baseline| baseline.features.cropped()) {
+        for caution in uncropped(&rows.training, &set.actions()?) {
+            progress(&format!("warning: {caution}"));
+            cautions.push(caution);
+        }
     }
     for caution in rows.tests.iter().filter_map(results::TestPart::unscored) {
         progress(&format!("warning: {caution}"));
@@ -317,4 +328,23 @@ fn baselines(
     let place = |b: &Baseline| (b.features, baselines.iter().position(|other| other == b));
     made.sort_by_key(|outcome| (place(&outcome.baseline), outcome.variant));
     Ok(made)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The same model given as a table lost the caution.
+    #[test]
+    fn a_table_of_a_method_that_learns_is_doubted() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let caution = |method: &str, own: Option<&'static str>| {
+            let text = format!("fileName,capacity[mL],method\nid1_0001.png,300,{method}\n");
+            std::fs::write(file.path(), text).unwrap();
+            let (name, path) = ("E".into(), file.path().into());
+            CapacityTable { name, path, own, learned_from: Vec::new() }.caution()
+        };
+        assert!(caution("fused", None).unwrap().contains("is of fused, which learns"));
+        assert_eq!((caution("m5", None), caution("fused", Some("rgb1"))), (None, None));
+    }
 }

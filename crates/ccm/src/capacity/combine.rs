@@ -5,16 +5,15 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use corsmal_files::draft;
-use corsmal_vision::lode::PRIOR_ML;
 
-use super::table::file_name;
+use super::table::{self, file_name};
 use crate::dataset::Subset;
 use crate::error::{CcmError, Result};
-use crate::predictions::{Named, read_capacities};
+use crate::predictions::Named;
 use crate::submission::RowKey;
 
-/// Writes the mean of the files' estimates of each recording, `prior` where none has one; what equals M5's
-/// prior, or is -1, is not an estimate. Returns the recordings and how many have the prior.
+/// Writes the mean of the files' estimates of each recording, `prior` where none has one; what has the
+/// status `prior`, equals M5's prior, or is -1, is not an estimate. Returns the recordings and how many have the prior.
 ///
 /// # Errors
 /// [`CcmError`] for unreadable files, recordings that a file lacks, a prior that is no capacity, and an output that
@@ -28,9 +27,9 @@ pub fn combine_files(inputs: &[PathBuf], prior: f64, out: &Path) -> Result<(usiz
     let mut estimates: BTreeMap<Named, Vec<f64>> = BTreeMap::new();
     let mut tables = Vec::with_capacity(inputs.len());
     for path in inputs {
-        let table = read_capacities(path)?;
-        for (&key, &value) in &table {
-            let known = value.filter(|&v| v != PRIOR_ML && v != prior);
+        let table = table::read(path)?;
+        for (&key, measured) in &table {
+            let known = measured.capacity_ml.filter(|&v| !measured.is_prior && v != prior);
             estimates.entry(key).or_default().extend(known);
         }
         tables.push((path, table));
@@ -46,20 +45,20 @@ pub fn combine_files(inputs: &[PathBuf], prior: f64, out: &Path) -> Result<(usiz
             });
         }
     }
-    // M5's columns alone, unless ids would be of several parts.
+    // M5's columns and what became of a recording; the part where ids would be of several.
     let by_part = |named: &Named| matches!(named.key, RowKey::Id(_)) && named.part.is_some();
     let several = estimates.keys().any(by_part);
-    let mut text = String::from("fileName,capacity[mL]");
+    let mut text = String::from("fileName,capacity[mL],status");
     text += if several { ",part\n" } else { "\n" };
     let mut without = 0;
     for (named, values) in &estimates {
-        let value = if values.is_empty() {
+        let (value, status) = if values.is_empty() {
             without += 1;
-            prior
+            (prior, if prior == -1.0 { "none" } else { "prior" })
         } else {
-            values.iter().sum::<f64>() / values.len() as f64
+            (values.iter().sum::<f64>() / values.len() as f64, "ok")
         };
-        let _ = write!(text, "{},{value}", file_name(named.key));
+        let _ = write!(text, "{},{value},{status}", file_name(named.key));
         if several {
             let _ = write!(text, ",{}", named.part.map_or("", Subset::name));
         }

@@ -25,6 +25,14 @@ pub enum Method {
 }
 
 impl Method {
+    /// All methods.
+    pub const ALL: [Self; 5] = [Self::M2, Self::M3, Self::M4, Self::M5, Self::Fused];
+
+    /// Whether it takes a model that was trained on containers.
+    pub fn learns(self) -> bool {
+        matches!(self, Self::M2 | Self::M3 | Self::Fused)
+    }
+
     /// Name in files and on the command line.
     pub fn name(self) -> &'static str {
         match self {

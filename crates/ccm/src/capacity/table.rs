@@ -7,7 +7,7 @@ use corsmal_files::draft;
 use corsmal_vision::lode::PRIOR_ML;
 
 use super::methods::Estimate;
-use super::options::CapacityOptions;
+use super::options::{CapacityOptions, Method};
 use super::problem::Problem;
 use crate::dataset::{Dimensions, Subset};
 use crate::error::{CcmError, Result};
@@ -166,6 +166,13 @@ pub fn read(path: &Path) -> Result<HashMap<Named, Measured>> {
         measured.insert(named, Measured { capacity_ml, is_prior, dimensions, execution_ms });
     }
     Ok(measured)
+}
+
+/// The method that made a table of [`write()`]; `None` for another one.
+pub(crate) fn method_of(path: &Path) -> Option<Method> {
+    let table = Table::read(path).ok()?;
+    let column = table.find("method").filter(|_| table.rows() > 0)?;
+    Method::ALL.into_iter().find(|method| method.name() == table.text(0, column))
 }
 
 /// Writes the table of what [`run`](super::run) made by these options; the file appears only when complete.

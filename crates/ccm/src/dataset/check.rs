@@ -76,6 +76,7 @@ pub fn check(set: &DataSet) -> Findings {
     if let (Some(path), Err(error)) = (&set.actions, set.actions()) {
         odd.push(Oddity { path: path.clone(), what: error.to_string() });
     }
+    let actions = set.actions().unwrap_or_default();
     let mut formats = BTreeMap::new();
     let mut seconds = 0.0;
     for recording in &set.recordings {
@@ -90,6 +91,15 @@ pub fn check(set: &DataSet) -> Findings {
                 let length =
                     spec.declared_frames.map_or(0.0, |n| n as f64 / f64::from(spec.sample_rate));
                 seconds += length;
+                let action = recording.container.zip(recording.name).and_then(|k| actions.get(&k));
+                if let Some(Some((start, _))) = action
+                    && spec.declared_frames.is_some()
+                    && *start >= length
+                {
+                    fault(format!(
+                        "its annotated action begins at {start} s, after its end at {length:.2} s"
+                    ));
+                }
                 if let (Some(declared), Some(there)) = (spec.declared_frames, source.most_frames())
                     && there < declared
                 {

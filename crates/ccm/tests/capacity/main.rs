@@ -324,6 +324,18 @@ fn ids_of_several_parts_stay_apart() {
     let both = dir.path().join("both.csv");
     assert_eq!(capacity::combine_files(&[out.clone(), out.clone()], -1.0, &both).unwrap(), (6, 6));
     assert_eq!(read_capacities(&both).unwrap().len(), 6);
+    // A substitute is no estimate, also of an earlier combination.
+    let (one, two) = (dir.path().join("one.csv"), dir.path().join("two.csv"));
+    let rows = "id1_0001.png,500,prior\nid1_0002.png,300,ok\nid1_0003.png,734.94,ok\n";
+    std::fs::write(&one, format!("fileName,capacity[mL],status\n{rows}")).unwrap();
+    assert_eq!(capacity::combine_files(&[one], 400.0, &two).unwrap(), (3, 2));
+    let of = |sequence: u16| Named::alone(RowKey::Sequence(1, sequence));
+    let read = capacity::read(&two).unwrap();
+    let priors = [1, 2, 3].map(|sequence| read[&of(sequence)].is_prior);
+    assert_eq!(priors, [true, false, true]);
+    let three = dir.path().join("three.csv");
+    assert_eq!(capacity::combine_files(&[two], 600.0, &three).unwrap(), (3, 2));
+    assert_eq!(capacity::read(&three).unwrap()[&of(1)].capacity_ml, Some(600.0));
     // A name twice in one part, and a part that there is not.
     let text = std::fs::read_to_string(&out).unwrap();
     for (from, to, said) in [

@@ -6,7 +6,6 @@ use std::process::ExitCode;
 use corsmal_ccm::CcmError;
 use corsmal_ccm::capacity::doubtful_colours;
 use corsmal_ccm::crop::{self, Written};
-use corsmal_ccm::dataset::DataSet;
 use serde_json::json;
 
 use crate::args::{Jobs, Told};
@@ -49,7 +48,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     let Args { data, detections, out, jobs, told } = args;
     crate::publish::require_disk(&out)?;
     let stop = crate::interrupt::flag();
-    if let Some(doubt) = doubtful_colours(&DataSet::open(&data)?.recordings) {
+    if let Some(doubt) = doubtful_colours(&crate::commands::dataset::open(&data)?.recordings) {
         eprintln!("warning: {doubt}");
     }
     let written = match crop::write(&data, detections.as_deref(), &out, jobs.count(), stop) {

@@ -1,6 +1,6 @@
 //! `corsmal-feat dataset`: the CCM data set on disk.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Subcommand;
@@ -46,6 +46,19 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         print(&findings);
     }
     Ok(if findings.sound() { ExitCode::SUCCESS } else { ExitCode::from(FAILED_FILES) })
+}
+
+/// Opens a data set, and says if files in it are odd: what they hold may be missing.
+pub fn open(root: &Path) -> Result<DataSet, Failure> {
+    let set = DataSet::open(root)?;
+    if let Some(first) = set.odd.first() {
+        let others = match set.odd.len() - 1 {
+            0 => String::new(),
+            n => format!(" (and {n} more: see dataset check)"),
+        };
+        eprintln!("warning: {}: {}{others}", first.path.display(), first.what);
+    }
+    Ok(set)
 }
 
 fn print(findings: &Findings) {

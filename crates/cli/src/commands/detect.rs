@@ -92,14 +92,13 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 /// Looks at frames and writes what is there.
 #[cfg(feature = "onnx")]
 pub fn run(args: Args) -> Result<ExitCode, Failure> {
-    use corsmal_ccm::dataset::DataSet;
     use corsmal_onnx::runtime::{Detector, Runtime};
     use serde_json::json;
 
     use crate::failure::{FAILED_FILES, INTERRUPTED};
     use crate::plural::plural;
 
-    let set = DataSet::open(&args.data)?;
+    let set = crate::commands::dataset::open(&args.data)?;
     corsmal_ccm::capacity::require_colours(&set.recordings)?;
     if let Some(doubt) = corsmal_ccm::capacity::doubtful_colours(&set.recordings) {
         eprintln!("warning: {doubt}");

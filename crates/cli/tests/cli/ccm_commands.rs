@@ -44,10 +44,22 @@ fn from_synthetic_recordings_to_the_report() {
     );
     assert!(said.contains("models/zcr-mfcc-knn-") && !said.contains("zcr-mfcc-rf"), "{said}");
 
-    // What is not cropped as the paper's were is said.
-    std::fs::remove_file(Path::new(data).join("man_annotations.csv")).unwrap();
+    // What is not cropped as the paper's were is said; also where times are milliseconds.
+    let actions = Path::new(data).join("man_annotations.csv");
+    let late = |cell: &str| match cell.parse::<f64>() {
+        Ok(seconds) if cell.contains('.') => (1000.0 * seconds).to_string(),
+        _ => cell.to_string(),
+    };
+    let table = std::fs::read_to_string(&actions).unwrap();
+    let rows = table.lines().map(|row| row.split(',').map(late).collect::<Vec<_>>().join(","));
+    std::fs::write(&actions, rows.collect::<Vec<_>>().join("\n")).unwrap();
     let whole = out.join("whole");
     let uncropped = ["--out", text(&whole), "-q", "--baselines", "spectrogram-knn"];
+    let said = lines(&run(&[&["benchmark", "--data", data], &uncropped[..]].concat()).stderr);
+    assert!(said.contains("an annotated action that begins after their end"), "{said}");
+    let odd = lines(&run(&["dataset", "check", data]).stdout);
+    assert!(odd.contains("its annotated action begins at"), "{odd}");
+    std::fs::remove_file(&actions).unwrap();
     let said = lines(&run(&[&["benchmark", "--data", data], &uncropped[..]].concat()).stderr);
     assert!(said.contains("training recordings have no annotated action"), "{said}");
     let page = std::fs::read_to_string(whole.join("report.html")).unwrap();

@@ -182,6 +182,21 @@ fn recordings_of_several_rates_are_said_to_differ() {
         let expected = "have sample rates of 22050, 44100 Hz, so their features differ; resample";
         assert_eq!(message.contains(expected), differ, "{net}: {message}");
     }
+    // A field that is damaged, without a hash, took the check of formats with it.
+    let bytes = std::fs::read(&model).unwrap();
+    let end = 8 + u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
+    let header = std::str::from_utf8(&bytes[8..end]).unwrap();
+    let hash = header.find(r#",\"hash\":\""#).unwrap();
+    let header = [&header[..hash], &header[hash + r#",\"hash\":\"\""#.len() + 64..]].concat();
+    let header = header.replace(r#"\"trained_on\":{"#, r#"\"trained_on\":{\"x\":1,"#);
+    let damaged = folder.path().join("damaged.safetensors");
+    let length = (header.len() as u64).to_le_bytes();
+    std::fs::write(&damaged, [&length[..], header.as_bytes(), &bytes[end..]].concat()).unwrap();
+    let refusal = refused(&["classify", "-m", text(&damaged), text(&audio), "-o", "-"]);
+    assert!(refusal.contains("the model is damaged: trained_on"), "{refusal}");
+    let any = ["--any-rate", "--features", text(&damaged), "-o", "-"];
+    let refusal = refused(&[&["classify", "-m", text(&model)], &any[..]].concat());
+    assert!(refusal.contains("--any-rate is for recordings"), "{refusal}");
     // So are their statistics, wherever something is learned of them.
     let table = folder.path().join("t.npz");
     done(&["extract", text(&audio), "--preset", "mfcc-zcr", "-q", "-o", text(&table)]);

@@ -265,6 +265,9 @@ impl Output {
 
 /// Why a row does not fit.
 pub(super) fn other_width(actual: usize, expected: usize) -> String {
+    if actual == expected {
+        return "gives other numbers than earlier recordings: it has another sample rate".into();
+    }
     format!(
         "gives {actual} numbers, earlier recordings gave {expected}: it has another number of channels"
     )

@@ -7,17 +7,22 @@ use corsmal_files::csv_text::{self, Fault};
 use super::{Detection, MAX_DETECTIONS, Segmentation, beside, detection};
 use crate::error::{Result, VisionError};
 
+/// Columns that a table must have.
+const COLUMNS: [&str; 8] = ["frame", "view", "label", "score", "x_min", "y_min", "x_max", "y_max"];
+
 pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Vec<Detection>> {
     let mut reader = csv_text::reader(bytes).map_err(|e| VisionError::file(path, e.to_string()))?;
     let fault = |e: Fault| VisionError::file(path, e.to_string());
     let header = csv_text::header(&mut reader).map_err(fault)?;
     let column = |name: &str| header.iter().position(|h| h.eq_ignore_ascii_case(name));
-    for name in ["frame", "view", "label", "score", "x_min", "y_min", "x_max", "y_max"] {
+    for name in COLUMNS {
         if column(name).is_none() {
             let there: Vec<_> = header.iter().collect();
             let there = there.join(", ");
             return Err(VisionError::file(path, format!("no column '{name}'; it has {there}")));
         }
+    }
+    for name in COLUMNS.into_iter().chain(["mask"]) {
         // The first of two would count, whatever the other says.
         if header.iter().filter(|h| h.eq_ignore_ascii_case(name)).count() > 1 {
             return Err(VisionError::file(path, format!("two columns are named '{name}'")));
@@ -52,4 +57,19 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Vec<Detection>> {
         detections.push(detection(names, score, bounds, mask).map_err(place)?);
     }
     Ok(detections)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The first of two columns counted, though it was empty.
+    #[test]
+    fn no_column_is_there_twice() {
+        for twice in COLUMNS.into_iter().chain(["mask"]) {
+            let text = format!("{},mask,{twice}\n", COLUMNS.join(","));
+            let refused = read(text.as_bytes(), Path::new("x.csv")).unwrap_err().to_string();
+            assert!(refused.contains(&format!("two columns are named '{twice}'")), "{refused}");
+        }
+    }
 }

@@ -13,7 +13,6 @@ use std::process::ExitCode;
 use clap::{Subcommand, ValueEnum};
 use corsmal_ccm::CcmError;
 use corsmal_ccm::capacity::{self, CapacityModel, CapacityOptions, Method, Row};
-use corsmal_ccm::dataset::DataSet;
 use corsmal_ccm::submission::RowKey;
 use corsmal_vision::cuboid::Outliers;
 use serde_json::json;
@@ -141,8 +140,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
 fn estimate(args: Estimate) -> Result<ExitCode, Failure> {
     publish::check_table(&args.out, args.overwrite)?;
     let method = args.method.method();
-    let learns = matches!(method, Method::M2 | Method::M3 | Method::Fused);
-    if args.model.is_some() && !learns {
+    if args.model.is_some() && !method.learns() {
         return Err(unused("--model", "m2, m3 and fused", method));
     }
     if args.weights.is_some() && method != Method::M2 {
@@ -166,7 +164,8 @@ fn estimate(args: Estimate) -> Result<ExitCode, Failure> {
         };
     }
     read_learned(&mut options, args.model.as_deref(), args.weights.as_deref())?;
-    if let (Some(folder), Ok(set)) = (&options.detections, DataSet::open(&options.data))
+    let set = crate::commands::dataset::open(&options.data)?;
+    if let Some(folder) = &options.detections
         && let Some(without) = capacity::without_tables(&set.recordings, Some(folder))
     {
         eprintln!("warning: {without}");

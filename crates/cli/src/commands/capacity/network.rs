@@ -71,6 +71,7 @@ pub(super) fn train(args: Args) -> Result<ExitCode, Failure> {
     };
     let pool = args.source.jobs.pool()?;
     let options = args.source.options(Method::M2, VariantName::Corrected);
+    crate::commands::dataset::open(&options.data)?;
     let found = match capacity::regions(&options, &|_, _| {}, interrupt::flag()) {
         Err(error @ CcmError::Interrupted) => {
             eprintln!("{error}");

@@ -27,6 +27,7 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
         Learning::Fused => Method::Fused,
     };
     let options = args.source.options(method, VariantName::Corrected);
+    crate::commands::dataset::open(&options.data)?;
     let capacity::Learned { model, held_out, recordings, failed } =
         match capacity::train(&options, &|_, _| {}, crate::interrupt::flag()) {
             Err(error @ CcmError::Interrupted) => {

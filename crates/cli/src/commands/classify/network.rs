@@ -26,6 +26,11 @@ use crate::recordings::warn;
 pub fn run(args: &Args, model: &NetModel) -> Result<(End, Option<Records>), Failure> {
     let labels = Labels::new(model.header.labels.clone())?;
     let vote = args.vote.rule(&labels)?;
+    let is_of_pictures = networks::named(&model.header.network)
+        .is_ok_and(|definition| definition.picture().is_some());
+    if args.any_rate && (args.features.is_some() || is_of_pictures) {
+        return Err(Failure::new("--any-rate is for recordings"));
+    }
     if let Some(path) = &args.features {
         if vote.is_some() {
             return Err(Failure::new("--vote works on windows of recordings, not on --features"));

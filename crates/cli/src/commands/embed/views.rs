@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
 use corsmal_ccm::capacity::{Problem, Views, doubtful_colours, require_colours};
-use corsmal_ccm::dataset::{Container, DataSet, SequenceName};
+use corsmal_ccm::dataset::{Container, SequenceName};
 use corsmal_files::format::require_npz;
 use corsmal_nets::dataset::Dataset;
 use corsmal_nets::items::{Column, Items};
@@ -26,7 +26,7 @@ pub fn run(args: &Args, data: &Path, model: &Path, library: &Path) -> Result<Exi
     crate::publish::check(&args.out, args.overwrite)?;
     let identity = corsmal_files::identity::of_file(model)
         .map_err(|e| Failure::new(format!("{}: {e}", model.display())))?;
-    let set = DataSet::open(data)?;
+    let set = crate::commands::dataset::open(data)?;
     require_colours(&set.recordings)?;
     if let Some(doubt) = doubtful_colours(&set.recordings) {
         eprintln!("warning: {doubt}");
