@@ -66,7 +66,7 @@ def extract(
         default the current folder
     partition_by : label that divides `out`, which is then a folder with a file
         `label=value/part.parquet` for each value of the label
-    resume : continue an interrupted run to `out`
+    resume : continue an interrupted run to `out`, with `overwrite` also one that replaces it
     overwrite : replace `out`
     progress : True shows on standard error how many recordings are done; a function is called with
         this number and the total
