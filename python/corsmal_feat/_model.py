@@ -192,12 +192,17 @@ class TrainedModel:
             found = extract(different, config=self.feature_config)
         if len(found.outcomes) != len(different):
             raise ParameterError("X holds folders, globs or manifests: name each recording")
+        repaired: list[str] = []
         for path, outcome in zip(different, found.outcomes, strict=True):
             if outcome["status"] not in GOOD:
                 raise DecodeError(f"{path}: {outcome['status']}: {outcome['reason']}")
             if repairs := ", ".join(outcome.get("repairs", ())):
                 reason = f": {outcome['reason']}" if outcome["reason"] else ""
-                warn(f"{path}: repaired ({repairs}){reason}")
+                repaired.append(f"{path}: repaired ({repairs}){reason}")
+        if repaired:
+            others = len(repaired) - 1
+            were = "was" if others == 1 else "were"
+            warn(repaired[0] + (f"; {others} more {were} repaired" if others else ""))
         self._check_heard(found.outcomes, any_rate)
         if found.summary is None or len(found.names) != self.n_features_in_:
             raise ParameterError(

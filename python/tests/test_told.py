@@ -35,9 +35,19 @@ def test_predictions_of_truncated_recordings_warn(tmp_path: pathlib.Path) -> Non
     knn.save(tmp_path / "knn.model", features=found)
     model = corsmal_feat.load_model(tmp_path / "knn.model")
     whole = paths[0].read_bytes()
-    paths[0].write_bytes(whole[: len(whole) * 2 // 3])
-    with pytest.warns(UserWarning, match=r"0\.wav: repaired \(truncated\): the file ends after"):
-        model.predict([str(paths[0])])
+    for path in paths[:2]:
+        path.write_bytes(whole[: len(whole) * 2 // 3])
+    with pytest.warns(UserWarning) as told:
+        model.predict([str(path) for path in paths])
+    (message,) = [str(warning.message) for warning in told]
+    assert "0.wav: repaired (truncated): the file ends after" in message
+    assert message.endswith("; 1 more was repaired")
+    # A refusal comes alone.
+    paths[5].write_bytes(b"no audio")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(corsmal_feat.errors.DecodeError, match=r"5\.wav"):
+            model.predict([str(path) for path in paths])
 
 
 def test_windows_that_are_missing_are_told(tmp_path: pathlib.Path) -> None:

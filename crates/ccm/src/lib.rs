@@ -34,6 +34,7 @@ pub mod crop;
 pub mod dataset;
 pub mod decision;
 pub mod error;
+mod folders;
 pub mod fused;
 pub mod paper;
 pub mod predictions;

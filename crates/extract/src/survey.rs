@@ -223,14 +223,26 @@ impl Survey {
         warnings
     }
 
-    /// Whether an earlier run that came to this outcome had a table of the same width.
+    /// Whether a run with this table could have come to this outcome.
     pub fn agrees(&self, outcome: &Outcome) -> bool {
-        let refusal = outcome.channels.and_then(|n| self.refusal(u16::try_from(n).ok()?));
-        match outcome.status {
-            Status::Mismatch if outcome.reason.ends_with(ONE_WIDTH) => {
-                refusal.as_ref() == Some(&outcome.reason)
-            }
-            status => refusal.is_none() || !status.has_features(),
+        let (Some(width), Some(channels)) = (self.channels(), outcome.channels) else {
+            return true;
+        };
+        let is_as_wide = channels == u32::from(width);
+        match is_refusal(outcome) {
+            true => !is_as_wide,
+            false => is_as_wide || !outcome.status.has_features(),
+        }
+    }
+
+    /// Gives the reason of an earlier run that refused a recording for its channels as of now: other
+    /// recordings may have set the width.
+    pub fn renew(&self, outcome: &mut Outcome) {
+        let channels = outcome.channels.and_then(|channels| u16::try_from(channels).ok());
+        if let Some(reason) = channels.and_then(|channels| self.refusal(channels))
+            && is_refusal(outcome)
+        {
+            outcome.reason = reason;
         }
     }
 
@@ -256,6 +268,11 @@ fn depends_on_channels(config: &Config) -> bool {
 /// What the user can do.
 const ONE_WIDTH: &str =
     "--set signal.channels=mean or --set summary.average_channels=true gives one width";
+
+/// Whether a recording was refused for its channels.
+fn is_refusal(outcome: &Outcome) -> bool {
+    outcome.status == Status::Mismatch && outcome.reason.ends_with(ONE_WIDTH)
+}
 
 fn channels_text(channels: u16) -> String {
     format!("{channels} channel{}", if channels == 1 { "" } else { "s" })

@@ -60,33 +60,48 @@ impl TrainedOn {
     /// # Errors
     /// [`OtherRate`] for a rate to which no training recording was brought.
     pub fn rule(&self, own: &Value, used: &Value) -> std::result::Result<FormatRule, OtherRate> {
-        let averaged = used["summary"]["average_channels"] == Value::Bool(true);
-        let every_channel = used["signal"]["channels"] == "all" && !averaged;
         let own_rate = rate(used) == 0.0;
         let rates = &self.sample_rates;
         // The rates of files say nothing where all were resampled.
         let trained = match rate(own) {
-            0.0 => rates.clone(),
-            resampled => vec![resampled as u32],
+            0.0 => rates.iter().map(|rate| f64::from(*rate)).collect(),
+            resampled => vec![resampled],
         };
         let is_known = match own_rate {
             true => rate(own) == 0.0,
-            false => trained.iter().any(|r| f64::from(*r) == rate(used)),
+            false => trained.contains(&rate(used)),
         };
         if !is_known {
-            let trained = trained.iter().map(|rate| hertz(*rate)).collect::<Vec<_>>().join(", ");
+            let trained = trained.into_iter().map(hertz).collect::<Vec<_>>().join(", ");
             return Err(OtherRate { rate: rate(used), trained });
         }
+        Ok(FormatRule {
+            sample_rates: own_rate.then(|| rates.clone()),
+            ..self.channel_rule(own, used)
+        })
+    }
+
+    /// The same for any sample rate, and for numbers of channels that change which channels are read, but
+    /// not how many features there are.
+    pub fn rule_of_any_rate(&self, own: &Value, used: &Value) -> FormatRule {
+        let rule = self.channel_rule(own, used);
+        FormatRule { channels: rule.channels.filter(|_| !rule.selected), ..rule }
+    }
+
+    /// What numbers of channels are taken, at any sample rate.
+    fn channel_rule(&self, own: &Value, used: &Value) -> FormatRule {
+        let averaged = used["summary"]["average_channels"] == Value::Bool(true);
+        let every_channel = used["signal"]["channels"] == "all" && !averaged;
         // One channel of eight is another signal than the one channel of a mono recording. Whoever
         // sets other channels than the model's has decided.
         let channels = &used["signal"]["channels"];
         let selected = channels.is_array() && *channels == own["signal"]["channels"];
-        Ok(FormatRule {
-            sample_rates: own_rate.then(|| rates.clone()),
+        FormatRule {
+            sample_rates: None,
             channels: (every_channel || selected).then(|| self.channels.clone()),
             selected,
             fixed: false,
-        })
+        }
     }
 }
 
@@ -129,14 +144,6 @@ impl FormatRule {
         Self { fixed: true, ..self }
     }
 
-    /// The same for any sample rate, and for numbers of channels that change which channels are read, but
-    /// not how many features there are.
-    pub fn of_any_rate(self) -> Self {
-        let Self { channels, selected, fixed, .. } = self;
-        let channels = channels.filter(|_| !selected);
-        Self { sample_rates: None, channels, selected, fixed }
-    }
-
     /// The sample rates in Hz that are taken; `None` for any.
     pub fn sample_rates(&self) -> Option<&[u32]> {
         self.sample_rates.as_deref()
@@ -160,12 +167,13 @@ impl FormatRule {
         if let (Some(known), Some(rate)) = (&self.sample_rates, sample_rate)
             && !known.contains(&rate)
         {
-            let trained = known.iter().map(|rate| hertz(*rate)).collect::<Vec<_>>().join(", ");
+            let trained = known.iter().map(|rate| hertz((*rate).into()));
+            let trained = trained.collect::<Vec<_>>().join(", ");
             let resample = known[0];
             differences.push(format!(
                 "{}; the model was trained on {trained}: --set signal.sample_rate={resample} \
                  resamples it, --any-rate takes it as it is",
-                hertz(rate)
+                hertz(rate.into())
             ));
         }
         if let (Some(known), Some(count)) = (&self.channels, channels)
@@ -196,7 +204,36 @@ impl FormatRule {
 }
 
 /// `44,100 Hz`
-fn hertz(rate: u32) -> String {
-    let (thousands, rest) = (rate / 1000, rate % 1000);
-    if thousands == 0 { format!("{rest} Hz") } else { format!("{thousands},{rest:03} Hz") }
+fn hertz(rate: f64) -> String {
+    if rate < 1000.0 || rate.fract() != 0.0 {
+        return format!("{rate} Hz");
+    }
+    format!("{},{:03} Hz", (rate / 1000.0).trunc(), rate % 1000.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    /// A model of recordings resampled to 4000.5 Hz refused them.
+    #[test]
+    fn a_fractional_rate_is_that_of_training() {
+        let trained = TrainedOn::of([(Some(8000), Some(1))]).unwrap();
+        let config = |rate: f64| json!({"signal": {"sample_rate": rate, "channels": "all"}});
+        let own = config(4000.5);
+        assert_eq!(trained.rule(&own, &own).unwrap().sample_rates(), None);
+        for other in [4000.0, 4000.25, 8000.0, 0.0] {
+            let refused = trained.rule(&own, &config(other)).unwrap_err().to_string();
+            assert!(refused.contains("must be 4000.5 Hz"), "{refused}");
+        }
+        let refused = trained.rule(&config(0.0), &config(16_000.0)).unwrap_err();
+        assert_eq!((refused.rate, refused.trained.as_str()), (16_000.0, "8,000 Hz"));
+        // Any rate says nothing about channels.
+        let any = trained.rule_of_any_rate(&own, &config(4000.0));
+        assert!(any.check(Some(16_000), Some(1)).is_ok() && any.check(None, Some(2)).is_err());
+        let spelled = [(44_100.0, "44,100 Hz"), (8000.0, "8,000 Hz"), (0.5, "0.5 Hz")];
+        assert!(spelled.into_iter().all(|(rate, text)| hertz(rate) == text));
+    }
 }

@@ -1,6 +1,7 @@
 //! Columns whose values name groups of rows that belong together.
 
 use std::collections::HashMap;
+use std::hash::Hash;
 
 use crate::dataset::{LabelledTable, Result};
 use crate::error::ModelError;
@@ -26,26 +27,44 @@ pub(crate) fn recordings<'t>(
     table: &'t LabelledTable,
     target: (&Labels, &Classes),
 ) -> Option<&'t str> {
-    let mut columns = std::iter::once(RECORDING).chain(table.shared_ids());
+    let is_whole = |ids: &&str| table.column(ids).is_ok_and(|ids| missing(&ids) == 0);
+    let ids = table.shared_ids().filter(is_whole).filter(|ids| !is_by_class(table, ids, target));
+    let mut columns = std::iter::once(RECORDING).chain(ids);
     columns.find(|column| are_several(table, column) && !is_target(table, column, target))
 }
 
-/// The first usual column of groups that folds in the column `folds` keep whole: it has several, and is not
-/// the target.
+/// Whether all rows of a class have one value of a column, so that no folds keep both whole.
+pub(crate) fn is_by_class(
+    table: &LabelledTable,
+    column: &str,
+    (_, classes): (&Labels, &Classes),
+) -> bool {
+    table.column(column).is_ok_and(|values| are_in(&classes.indices().to_vec(), &values))
+}
+
+/// Whether all rows of a part have the same whole.
+fn are_in<P: Eq + Hash, W: PartialEq>(parts: &[P], wholes: &[W]) -> bool {
+    let mut whole_of = HashMap::new();
+    let mut rows = parts.iter().zip(wholes);
+    rows.all(|(part, whole)| *whole_of.entry(part).or_insert(whole) == whole)
+}
+
+/// The first usual column of groups that folds in the column `folds` keep whole: it has several, is not the
+/// target, and keeps the `recordings` whole.
 pub(crate) fn kept(
     table: &LabelledTable,
     target: (&Labels, &Classes),
-    folds: &str,
+    (folds, recordings): (&str, Option<&str>),
 ) -> Option<&'static str> {
     let folds = table.column(folds).ok()?;
+    let recordings = recordings.map(|column| table.column(column)).transpose().ok()?;
     let is_kept = |column: &&str| {
         let Ok(values) = table.column(column) else { return false };
-        let mut fold_of = HashMap::new();
-        let mut rows = values.iter().zip(&folds);
         missing(&values) == 0
             && are_several(table, column)
             && !is_target(table, column, target)
-            && rows.all(|(value, fold)| fold_of.insert(value, fold).is_none_or(|old| old == fold))
+            && are_in(&values, &folds)
+            && recordings.as_ref().is_none_or(|recordings| are_in(recordings, &values))
     };
     USUAL.into_iter().find(is_kept)
 }

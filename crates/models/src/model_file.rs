@@ -257,6 +257,13 @@ impl Model {
         }
     }
 
+    /// The same for any sample rate; all pass where it is unknown what the model was trained on.
+    pub fn format_rule_of_any_rate(&self, config: &Value) -> FormatRule {
+        let own = &self.header.feature_config;
+        let rule = |trained: &TrainedOn| trained.rule_of_any_rate(own, config);
+        self.header.trained_on.as_ref().map(rule).unwrap_or_default()
+    }
+
     /// How long the recordings are that the model was trained on, where features made with `config`
     /// depend on it and it is known.
     pub fn lengths(&self, config: &Value) -> Option<Lengths> {

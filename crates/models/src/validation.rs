@@ -64,6 +64,8 @@ pub fn validate(
     let folds = Folds::new(plan, table, groups, (&labels, &classes), seed)?;
     let mut warnings: Vec<String> = table.unmatched.iter().cloned().collect();
     warnings.extend(folds.warnings(&classes));
+    let is_choice = candidates.len() > 1;
+    warnings.extend(folds.choice_warning().filter(|_| is_choice).map(String::from));
     warnings.extend(dominance(&candidates, table));
     let dataset = table.dataset(classes.clone());
     let data = Data { dataset: &dataset, merge: None };

@@ -240,7 +240,9 @@ impl Training<'_> {
     ) -> Result<(Folds, Vec<String>)> {
         let (labels, classes) = examples.table.classes(self.target)?;
         let folds = Folds::new(plan, &examples.table, self.groups, (&labels, &classes), seed)?;
-        let warnings = folds.warnings(&classes);
+        let mut warnings = folds.warnings(&classes);
+        let is_choice = self.recipe.select == Select::Validation;
+        warnings.extend(folds.choice_warning().filter(|_| is_choice).map(String::from));
         Ok((folds, warnings))
     }
 
@@ -260,7 +262,7 @@ impl Training<'_> {
         require_whole(&recipe, examples)?;
         let (labels, classes) = table.classes(self.target)?;
         let y = examples.classes(&classes);
-        let groups = folds.groups().map(|groups| examples.of_items(groups));
+        let groups = folds.choice_groups().map(|groups| examples.of_items(groups));
         let groups = groups.as_deref();
         let state = self.weights.map(|weights| weights.state_for(definition, &labels));
         let weights = state.as_deref();

@@ -124,7 +124,7 @@ fn cross_validate(args: &Args) -> Result<ExitCode, Failure> {
         let found = validate(&table, &target, candidates, plan, seed)?;
         is_seeded |= found.candidates != validation.candidates
             || found.folds.outer != validation.folds.outer
-            || found.candidates.len() > 1 && found.folds.groups().is_none();
+            || found.candidates.len() > 1 && found.folds.choice_groups().is_none();
         Ok((seed, found.result.pooled))
     });
     let others = others.collect::<Result<Vec<_>, Failure>>()?;

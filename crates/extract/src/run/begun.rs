@@ -19,7 +19,7 @@ use super::partitions::PartitionBy;
 use super::stored::StoredOutput;
 use crate::config::Config;
 use crate::inputs::{Identities, Input};
-use crate::ledger::{self, Ledger, Record, Resumed};
+use crate::ledger::{self, Ledger, LedgerError, Record, Resumed};
 use crate::survey::Survey;
 
 /// A run that has begun, or was done before.
@@ -101,11 +101,28 @@ impl<'a> Begun<'a> {
             }
             return ending(report.resumed).send(report, stop).map(State::Done).map(Self);
         }
+        // Before headers are read, which may take long.
+        Ledger::require_idle(&out)?;
         let survey = Survey::of(all, config, stop);
-        let (ledger, records) = if options.resume {
-            resume((inputs, &survey, stop), &out, &header, progress)?
-        } else {
-            (Ledger::create(&out, &header)?, Vec::new())
+        let resumed = match options.resume {
+            true => resume((inputs, all), (&survey, stop), &out, &header, progress).map(Some),
+            false => Ok(None),
+        };
+        let resumed = match resumed {
+            Err(RunError::Ledger(LedgerError::Differs { path, field, found, expected }))
+                if overwrite =>
+            {
+                let path = path.display();
+                progress.warning(&format!(
+                    "{path} is of a run with {field} {found}, this one has {expected}: the run starts again"
+                ));
+                None
+            }
+            resumed => resumed?,
+        };
+        let (ledger, records) = match resumed {
+            Some(resumed) => resumed,
+            None => (Ledger::create(&out, &header)?, Vec::new()),
         };
         if let Some(limit) = options.max_errors {
             let bad: Vec<_> =
@@ -166,7 +183,8 @@ impl Ending<'_> {
 
 /// What an interrupted run has done of what is still the same.
 fn resume(
-    (inputs, survey, stop): (&[Input], &Survey, &Arc<AtomicBool>),
+    (inputs, all): (&[Input], &[Input]),
+    (survey, stop): (&Survey, &Arc<AtomicBool>),
     out: &Path,
     header: &ledger::Header,
     progress: &dyn Progress,
@@ -179,6 +197,9 @@ fn resume(
         let Some(input) = inputs.get(i).filter(|input| input.id == record.outcome.id) else {
             return false;
         };
+        if unreadable.borrow().is_some() {
+            return true;
+        }
         let now = identities.get(i);
         if stop.load(Ordering::Relaxed) {
             // What is not known to have changed stays done.
@@ -199,8 +220,14 @@ fn resume(
         if !same {
             progress.warning(&format!("{id} has changed; the run continues from there"));
         } else if !survey.agrees(&record.outcome) {
+            // Most recordings of those that can be read now may not be most recordings.
+            let of_all = Identities::of(all, stop);
+            if let Some(hidden) = (0..all.len()).find(|i| of_all.get(*i).is_empty()) {
+                unreadable.replace(Some(all[hidden].source.to_string()));
+                return true;
+            }
             progress.warning(&format!(
-                "the number of channels that most recordings have has changed: {id} and what follows it are computed again"
+                "most recordings now have another number of channels: {id} and what follows it are computed again"
             ));
             return false;
         } else if now == identity::STREAM && !unversioned.replace(true) {
@@ -211,7 +238,7 @@ fn resume(
         }
         same
     };
-    let (ledger, Resumed { records, dropped }) = Ledger::resume(out, header, keep)?;
+    let (ledger, Resumed { mut records, dropped }) = Ledger::resume(out, header, keep)?;
     if stop.load(Ordering::Relaxed) {
         return Err(RunError::Interrupted);
     }
@@ -221,5 +248,6 @@ fn resume(
     if let Some(reason) = dropped {
         progress.warning(&format!("{reason}; the run continues from there"));
     }
+    records.iter_mut().for_each(|record: &mut Record| survey.renew(&mut record.outcome));
     Ok((ledger, records))
 }

@@ -101,14 +101,20 @@ pub fn check(
     let (mut done, mut is_sent) = (None, false);
     let own = options.shard.of(inputs);
     let finished = Finished { inputs: own, provenance: &provenance, format, by };
-    if options.overwrite && stored.is_some() && out.exists() {
-        // What did not reach its store is sent, not made again.
+    let is_pending = Ledger::is_pending(out);
+    if options.overwrite && (options.resume || stored.is_some()) && out.exists() {
+        // What did not reach its store is sent, not made again; and what an interrupted run was to replace
+        // may have been replaced.
         done = finished.report(out, out, stop).ok();
     }
-    let is_pending = Ledger::is_pending(out);
-    if options.overwrite && options.resume && !is_pending && done.is_none() && out.exists() {
-        // What an interrupted run was to replace may have been replaced.
-        done = finished.report(out, out, stop).ok();
+    if let Some(stored) = &stored
+        && options.overwrite
+        && options.resume
+        && done.is_none()
+        && let Some(copy) = stored.present(stop)?
+    {
+        done = finished.report(copy.place(), &PathBuf::from(stored.name()), stop).ok();
+        is_sent = done.is_some();
     }
     if !options.overwrite {
         if let Some(stored) = &stored

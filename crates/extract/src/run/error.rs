@@ -24,7 +24,7 @@ pub enum RunError {
     },
     /// The output is there, holds something else, and an interrupted run was to replace it.
     #[error(
-        "{path} exists and {why}; an interrupted run was to replace it: --overwrite --resume continues that run, \
+        "{path} exists and {why}; an interrupted run was to replace it: --overwrite with --resume continues that run, \
          --overwrite starts again"
     )]
     Replaced {
@@ -46,9 +46,10 @@ pub enum RunError {
         "a .parquet table holds statistics: add a [summary] to the configuration, or write .npz"
     )]
     NoSummary,
-    /// An input of the interrupted run cannot be read any more.
+    /// An input of the interrupted run cannot be read now.
     #[error(
-        "{path} cannot be read now, but the interrupted run read it; make it readable, then --resume"
+        "{path} cannot be read now, but the interrupted run may have read it: make it readable and run the same \
+         command again"
     )]
     Unreadable {
         /// The input.
@@ -132,7 +133,9 @@ pub enum RunError {
     #[error(transparent)]
     Name(#[from] FormatError),
     /// A fault of this program while writing the output.
-    #[error("this is a bug in corsmal-feat: please report it; --resume continues the run")]
+    #[error(
+        "this is a bug in corsmal-feat: please report it; the same command with --resume continues the run"
+    )]
     Broken,
     /// A temporary file beside the output failed.
     #[error("{path}: temporary file: {source}")]

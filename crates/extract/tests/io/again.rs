@@ -7,7 +7,8 @@ use std::sync::{Arc, Mutex};
 
 use corsmal_extract::config::Config;
 use corsmal_extract::cut::{WindowSpan, into_windows};
-use corsmal_extract::inputs;
+use corsmal_extract::inputs::{self, Input};
+use corsmal_extract::ledger::ledger_path;
 use corsmal_extract::merge::{self, Existing};
 use corsmal_extract::run::{self, Progress, RunError, RunOptions, RunReport};
 use corsmal_files::npz::Compression;
@@ -59,9 +60,23 @@ impl Folder {
         self.0.path().join(name)
     }
 
+    fn inputs(&self) -> Vec<Input> {
+        inputs::collect(&[text(&self.path("audio"))]).unwrap().inputs
+    }
+
     /// A run over all recordings, and what it has told.
     fn run(
         &self,
+        preset: &str,
+        change: impl Fn(&mut RunOptions),
+    ) -> (Result<RunReport, RunError>, String) {
+        self.run_of(&self.inputs(), preset, change)
+    }
+
+    /// A run over these recordings.
+    fn run_of(
+        &self,
+        found: &[Input],
         preset: &str,
         change: impl Fn(&mut RunOptions),
     ) -> (Result<RunReport, RunError>, String) {
@@ -77,10 +92,9 @@ impl Folder {
             max_errors: None,
         };
         change(&mut options);
-        let found = inputs::collect(&[text(&self.path("audio"))]).unwrap().inputs;
         let config = Arc::new(Config::preset(preset).unwrap());
         let (told, stop) = (Told::default(), Arc::new(AtomicBool::new(false)));
-        let report = run::run(&found, &config, &options, &told, &stop);
+        let report = run::run(found, &config, &options, &told, &stop);
         (report, told.0.into_inner().unwrap().join("\n"))
     }
 }
@@ -101,14 +115,12 @@ fn an_interrupted_run_that_replaces_an_output_goes_on() {
     // The user has not said again that the output may go.
     let (refused, _) = folder.run("mfcc-zcr", |options| options.resume = true);
     let refused = refused.unwrap_err().to_string();
-    assert!(refused.contains("--overwrite --resume continues that run"), "{refused}");
+    assert!(refused.contains("--overwrite with --resume continues that run"), "{refused}");
     let both = |options: &mut RunOptions| (options.resume, options.overwrite) = (true, true);
     let report = folder.run("mfcc-zcr", both).0.unwrap();
     assert_eq!((report.resumed, report.failed()), (1, 0));
-    let out = fs::read(folder.path("out.npz")).unwrap();
-    let expected = fs::read(folder.path("expected.npz")).unwrap();
-    // Times of files are in both.
-    assert_eq!(out.len(), expected.len());
+    let read = |name| fs::read(folder.path(name)).unwrap();
+    assert!(read("out.npz") == read("expected.npz"));
     // Nothing is left to do, and another output is replaced.
     assert!(folder.run("mfcc-zcr", both).0.unwrap().up_to_date);
     let other = folder.run("esc26", both).0.unwrap();
@@ -132,6 +144,84 @@ fn a_change_of_the_usual_channels_is_work_not_done() {
     folder.run("mfcc-zcr", fresh).0.unwrap();
     let read = |name| fs::read(folder.path(name)).unwrap();
     assert!(read("out.npz") == read("fresh.npz"));
+}
+
+/// A run left by another configuration was in the way of an output that was right already, and of a new run.
+#[test]
+fn a_run_of_another_configuration_is_replaced() {
+    let folder = Folder::of(&[1, 1]);
+    folder.run("esc26", |_| {}).0.unwrap();
+    fs::write(folder.path("audio/2.wav"), b"no audio").unwrap();
+    let stopping = |options: &mut RunOptions| {
+        (options.overwrite, options.max_errors) = (true, Some(0));
+    };
+    assert!(folder.run("mfcc-zcr", stopping).0.is_err());
+    fs::remove_file(folder.path("audio/2.wav")).unwrap();
+    let both = |options: &mut RunOptions| (options.resume, options.overwrite) = (true, true);
+    let ledger = ledger_path(&folder.path("out.npz"));
+    // What the other run has done stays.
+    assert!(folder.run("esc26", both).0.unwrap().up_to_date && ledger.exists());
+    let (report, told) = folder.run("a34f136", both);
+    let report = report.unwrap();
+    assert!(!report.up_to_date && report.resumed == 0 && !ledger.exists());
+    assert!(told.contains("the run starts again"), "{told}");
+    // Without leave to replace anything it is refused.
+    assert!(folder.run("mfcc-zcr", stopping).0.is_ok());
+    fs::write(folder.path("audio/2.wav"), b"no audio").unwrap();
+    let new = |options: &mut RunOptions| {
+        (options.out, options.max_errors) = (folder.path("new.npz"), Some(0));
+    };
+    assert!(folder.run("mfcc-zcr", new).0.is_err());
+    let resumed = |options: &mut RunOptions| {
+        (options.out, options.resume) = (folder.path("new.npz"), true);
+    };
+    let refused = folder.run("esc26", resumed).0.unwrap_err().to_string();
+    assert!(refused.contains("the interrupted run had"), "{refused}");
+}
+
+/// A recording that could not be read for a moment cost all that was done, since another one was the first of
+/// its width.
+#[test]
+fn recordings_that_cannot_be_read_give_up_nothing() {
+    let folder = Folder::of(&[1, 1, 1, 2, 2]);
+    let found = folder.inputs();
+    let shard = |options: &mut RunOptions| options.shard = "1/2".parse().unwrap();
+    let own: Vec<String> = {
+        let shard: Shard = "1/2".parse().unwrap();
+        shard.of(&found).iter().map(|input| input.id.clone()).collect()
+    };
+    assert_eq!(own, ["2", "3", "4"]);
+    let stopped = folder.run_of(&found, "mfcc-zcr", |options| {
+        shard(options);
+        options.max_errors = Some(0);
+    });
+    assert!(matches!(stopped.0, Err(RunError::TooManyErrors { .. })), "{:?}", stopped.0);
+    let ledger = ledger_path(&folder.path("out.npz"));
+    let done = fs::read(&ledger).unwrap();
+    let hide = |name: &str| fs::rename(folder.path(name), folder.path("hidden.wav")).unwrap();
+    let show = |name: &str| fs::rename(folder.path("hidden.wav"), folder.path(name)).unwrap();
+    let resume = |options: &mut RunOptions| {
+        shard(options);
+        (options.resume, options.max_errors) = (true, Some(0));
+    };
+    // As many recordings have two channels now, but one channel comes first.
+    hide("audio/1.wav");
+    let (stopped, told) = folder.run_of(&found, "mfcc-zcr", resume);
+    assert!(matches!(stopped, Err(RunError::TooManyErrors { .. })), "{stopped:?}");
+    assert!(!told.contains("computed again"), "{told}");
+    assert!(fs::read(&ledger).unwrap() == done);
+    // Most have two.
+    fs::rename(folder.path("audio/0.wav"), folder.path("0.wav")).unwrap();
+    let (unreadable, told) = folder.run_of(&found, "mfcc-zcr", resume);
+    assert!(matches!(unreadable, Err(RunError::Unreadable { .. })), "{unreadable:?} {told}");
+    assert!(fs::read(&ledger).unwrap() == done);
+    fs::rename(folder.path("0.wav"), folder.path("audio/0.wav")).unwrap();
+    show("audio/1.wav");
+    let (report, told) = folder.run_of(&found, "mfcc-zcr", |options| {
+        shard(options);
+        options.resume = true;
+    });
+    assert_eq!((report.unwrap().resumed, told.contains("computed again")), (2, false));
 }
 
 /// Only a run that has both in one table warned.

@@ -266,9 +266,11 @@ pub fn compare(
         (Some(_), None) | (None, Some(_)) => {
             let [with, without] = if folds.is_some() { [0, 1] } else { [1, 0] };
             warnings.push(format!(
-                "{} has folds and {} has none: no folds are drawn, and the comparison is unfair if a classifier \
+                "{} has folds and {} has {}: no folds are drawn, and the comparison is unfair if a classifier \
                  was trained on the rows that it predicts",
-                paths[with], paths[without]
+                paths[with],
+                paths[without],
+                [first, second][without].no_folds()
             ));
         }
         _ => {}

@@ -15,7 +15,7 @@ use super::error::{DatasetError, Result};
 use super::ids::not_an_id;
 use super::label_file::{LabelFile, LabelSource};
 use crate::formats::TrainedOn;
-use crate::labels::{Labels, missing, require_few};
+use crate::labels::{Labels, require_few};
 use crate::targets::Classes;
 
 /// What the column `joint` is put together from, where there is no such column.
@@ -42,7 +42,7 @@ pub struct LabelledTable {
     /// members of files of other programs that cannot be read, and why
     pub(super) unread: Vec<(String, String)>,
     /// whether the ids are only the numbers of the rows
-    pub(super) numbered: bool,
+    pub(crate) numbered: bool,
     /// label columns of other files, with these
     pub(super) added: Vec<(String, PathBuf)>,
     /// labels that no recording of the table has, if there are such
@@ -132,7 +132,7 @@ impl LabelledTable {
                         &self.path,
                         format!(
                             "its rows are only numbered, so labels could go to the wrong rows: {why}; \
-                             --ids names the ids"
+                             --ids names a member with another value in each row"
                         ),
                     ));
                 }
@@ -174,13 +174,10 @@ impl LabelledTable {
         Ok(hidden)
     }
 
-    /// The column of ids that several rows share, where rows are numbered instead.
+    /// The column of ids that some rows share or lack, where rows are numbered instead.
     pub(crate) fn shared_ids(&self) -> Option<&'static str> {
-        let is_shared = |name: &&str| {
-            let column = self.columns.iter().find(|(column, _)| column == name);
-            column.is_some_and(|(_, ids)| missing(ids) == 0)
-        };
-        ID_NAMES.into_iter().filter(|_| self.numbered).find(is_shared)
+        let is_there = |name: &&str| self.columns.iter().any(|(column, _)| column == name);
+        ID_NAMES.into_iter().filter(|_| self.numbered).find(is_there)
     }
 
     /// Why what looks like ids is none, where rows are numbered instead.

@@ -8,14 +8,11 @@ use corsmal_files::outcome::Status;
 use ndarray::Array2;
 
 use super::{
-    Id, OF_LINES, PredictionError, PredictionRow, PredictionTable, Result, STATUS, content,
+    AGREED, Id, OF_LINES, PredictionError, PredictionRow, PredictionTable, Result, STATUS, content,
 };
 use crate::fusion::{self, WindowVotes};
 use crate::table::argmax;
 use crate::voting::VotingRule;
-
-/// Columns of a recording that every file and every window must give alike, where they have them.
-const AGREED: [&str; 3] = ["true", "fold", "group"];
 
 impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
     /// Makes the windows of each recording one decision, in the order in which recordings appear. Its status is
@@ -47,7 +44,7 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
                 }
                 if one.is_empty() {
                     one.clone_from(two);
-                } else if AGREED.contains(&column) {
+                } else if self.is_agreed(column) {
                     return Err(self.content(format!(
                         "{}: {column} is {one} in one window and {two} in another; a vote needs \
                          one value for each recording, or a file without the column",
@@ -167,7 +164,10 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
         let others = others.filter(|name| *name != STATUS && !AGREED.contains(name));
         for name in AGREED.into_iter().chain(others) {
             let mut said: HashMap<&K, (&str, &Self)> = HashMap::new();
-            for table in tables {
+            // Tables where `fold` is a label contradict nobody.
+            let (agreed, others): (Vec<_>, Vec<_>) =
+                tables.iter().partition(|table| table.is_agreed(name));
+            for table in agreed.into_iter().chain(others) {
                 let Some(at) = table.position(name) else { continue };
                 for row in table.rows.iter().filter(|row| !row.cells[at].is_empty()) {
                     let own = row.cells[at].as_str();
@@ -175,7 +175,7 @@ impl<K: Clone + Eq + Hash + Ord + Display> PredictionTable<K> {
                     if own == *their {
                         continue;
                     }
-                    if AGREED.contains(&name) {
+                    if table.is_agreed(name) {
                         return Err(table.content(format!(
                             "{}: {name} is {own} here and {their} in {}: correct it, or remove \
                              the column {name} from one of the files",

@@ -48,6 +48,10 @@ const KEYS: [&str; 3] = ["id", "Configuration ID", "path"];
 const OF_LINES: [&str; 3] = ["start", "end", "windows"];
 /// What became of the recording: a decision over several lines has the worst of theirs.
 const STATUS: &str = "status";
+/// Column of the folds that held lines out.
+const FOLD: &str = "fold";
+/// Columns of a recording that every file and every window must give alike, where they have them.
+const AGREED: [&str; 3] = ["true", FOLD, "group"];
 
 /// What can be wrong with prediction files.
 #[derive(Debug, Error)]
@@ -168,7 +172,20 @@ impl<K> PredictionTable<K> {
     /// The folds that held the lines out. Beside `status`, which `classify` writes, `fold` is a label of the
     /// recordings.
     pub fn held_out_folds(&self) -> Option<Vec<&str>> {
-        self.column("fold").filter(|_| self.column(STATUS).is_none())
+        self.column(FOLD).filter(|_| self.column(STATUS).is_none())
+    }
+
+    /// What a table has in place of folds, in words.
+    pub fn no_folds(&self) -> &'static str {
+        match self.column(FOLD) {
+            None => "none",
+            Some(_) => "none (beside status, its column fold is a label)",
+        }
+    }
+
+    /// Whether a recording has one value of this column in all its lines and in all files.
+    pub(crate) fn is_agreed(&self, column: &str) -> bool {
+        AGREED.contains(&column) && (column != FOLD || self.held_out_folds().is_some())
     }
 
     /// The true class of each line as text: of the column named, or of one called `true`.

@@ -161,12 +161,11 @@ impl Args {
         model: &Model,
         config: &serde_json::Value,
     ) -> Result<FormatRule, Failure> {
-        let rule = model.format_rule(config);
         if self.any_rate {
-            return Ok(rule.map(FormatRule::of_any_rate).unwrap_or_default());
+            return Ok(model.format_rule_of_any_rate(config));
         }
         let place = self.model.display();
-        rule.map_err(|e| Failure::new(format!("{place}: {e}")))
+        model.format_rule(config).map_err(|e| Failure::new(format!("{place}: {e}")))
     }
 }
 

@@ -8,7 +8,7 @@ use crate::cv_plan::CvPlan;
 use crate::dataset::{LabelledTable, Result};
 use crate::error::ModelError;
 use crate::groups::{self, RECORDING};
-use crate::labels::{Labels, alike, is_missing, measured};
+use crate::labels::{Labels, alike, is_missing, measured, missing};
 use crate::splits::{self, Fold};
 use crate::targets::Classes;
 use crate::words::count;
@@ -32,6 +32,8 @@ pub struct Folds {
     pub outer: Vec<Fold>,
     /// never split, one name per row
     groups: Option<Vec<String>>,
+    /// what inner folds keep whole instead
+    choice: Option<Choice>,
     /// what is odd about them, in words
     odd: Vec<String>,
     /// whether these groups are no more than the folds of a column
@@ -57,17 +59,20 @@ impl Folds {
         let y = &classes.indices().to_vec();
         let target = (labels, classes);
         let is_default = plan.is_none();
-        let default = match groups.or_else(|| groups::usual(table, target)) {
-            Some(column) => CvPlan::Group(column.into()),
-            None => CvPlan::K(FOLDS),
+        let recordings = groups::recordings(table, target);
+        let default = match (groups.or_else(|| groups::usual(table, target)), recordings) {
+            (Some(column), _) => CvPlan::Group(column.into()),
+            (None, Some(recordings)) => {
+                CvPlan::K(FOLDS.min(Labels::of(&table.column(recordings)?).0.len()))
+            }
+            (None, None) => CvPlan::K(FOLDS),
         };
         let plan = plan.unwrap_or(&default);
         let named = groups;
-        let recordings =
-            groups::recordings(table, target).filter(|_| !matches!(plan, CvPlan::Lists(_)));
+        let recordings = recordings.filter(|_| !matches!(plan, CvPlan::Lists(_)));
         let groups = named.or(match plan {
             CvPlan::Group(column) => Some(column),
-            CvPlan::Fold(folds) => groups::kept(table, target, folds).or(recordings),
+            CvPlan::Fold(folds) => groups::kept(table, target, (folds, recordings)).or(recordings),
             _ => recordings,
         });
         let column = match plan {
@@ -77,7 +82,8 @@ impl Folds {
         let parts = column.map(|c| groups::values(table, c, ELSE)).transpose()?;
         let outer = match (plan, &parts) {
             (CvPlan::Group(_) | CvPlan::Fold(_), Some(g)) => splits::leave_one_group_out(g)?,
-            (CvPlan::K(k), Some(g)) => splits::group_k_fold(g, *k)?,
+            (CvPlan::K(k), Some(g)) => splits::group_k_fold(g, *k)
+                .map_err(|error| too_few(error, column.filter(|_| named.is_none())))?,
             (CvPlan::Lists(lists), Some(g)) => splits::group_lists(g, lists)?,
             (CvPlan::K(k), None) => stratified(labels, y, *k, seed)?,
             _ => {
@@ -95,7 +101,7 @@ impl Folds {
         let kept = match groups {
             Some(groups) if column != Some(groups) => {
                 let values = groups::values(table, groups, ELSE)?;
-                refuse_split(&outer, &values, (plan, groups), named.is_some())?;
+                refuse_split(&outer, &values, (plan, groups), column.filter(|_| named.is_none()))?;
                 Some(values)
             }
             _ => parts,
@@ -103,15 +109,18 @@ impl Folds {
         let is_finer = named.is_none() && matches!(plan, CvPlan::Group(_) | CvPlan::Fold(_));
         if let Some(recordings) = recordings.filter(|_| is_finer) {
             let values = groups::values(table, recordings, ELSE)?;
-            refuse_split(&outer, &values, (plan, recordings), false)?;
+            refuse_split(&outer, &values, (plan, recordings), column)?;
         }
-        let one = kept.is_none()
-            && table.ids.len() > 1
-            && table.column(RECORDING).is_ok_and(|values| Labels::of(&values).0.len() == 1);
+        let choice = match (named, groups, recordings) {
+            (None, Some(groups), Some(recordings)) if groups != recordings => {
+                Choice::of(&outer, (groups, kept.as_deref()), (recordings, table))?
+            }
+            _ => None,
+        };
         let mut odd = alike(labels);
         odd.extend(measured(labels, classes.len()));
-        if one {
-            odd.push(ONE_RECORDING.into());
+        if kept.is_none() {
+            odd.extend(neighbours(table, target, &outer));
         }
         if named.is_none() {
             let is_split = |column: &&str| {
@@ -131,7 +140,7 @@ impl Folds {
         odd.extend(copies::warning(table, &outer));
         let are_folds = matches!(plan, CvPlan::Fold(_)) && groups.is_none();
         let names = labels.names().to_vec();
-        Ok(Self { description, outer, groups: kept, odd, are_folds, names, seed })
+        Ok(Self { description, outer, groups: kept, choice, odd, are_folds, names, seed })
     }
 
     /// Inner folds alone, for choosing parameters on all rows.
@@ -152,19 +161,33 @@ impl Folds {
         let values = column.map(|column| groups::values(table, column, otherwise)).transpose()?;
         let recordings = groups::recordings(table, target);
         if let (None, Some(values), Some(recordings)) = (groups, &values, recordings) {
-            let recordings = groups::values(table, recordings, otherwise)?;
+            let values_of = groups::values(table, recordings, otherwise)?;
             let held_out = splits::leave_one_group_out(values)?;
-            refuse_split(&held_out, &recordings, (&"inner folds", RECORDING), false)?;
+            refuse_split(&held_out, &values_of, (&"inner folds", recordings), column)?;
         }
         let groups = values;
         let (outer, odd, names) = (Vec::new(), Vec::new(), labels.names().to_vec());
         let description = "inner folds".into();
-        Ok(Self { description, outer, groups, odd, are_folds: false, names, seed })
+        let (choice, are_folds) = (None, false);
+        Ok(Self { description, outer, groups, choice, odd, are_folds, names, seed })
     }
 
     /// What is never split, one name per row; `None` where any row may be held out.
     pub fn groups(&self) -> Option<&[String]> {
         self.groups.as_deref()
+    }
+
+    /// What inner folds keep whole: the groups, or the recordings where some fold trains on one group alone.
+    pub fn choice_groups(&self) -> Option<&[String]> {
+        match &self.choice {
+            Some(choice) => Some(&choice.recordings),
+            None => self.groups(),
+        }
+    }
+
+    /// What those should know who choose parameters or epochs inside the folds.
+    pub fn choice_warning(&self) -> Option<&str> {
+        self.choice.as_ref().map(|choice| choice.warning.as_str())
     }
 
     /// What rows belong to that are not independent of each other: the groups, unless they are no
@@ -180,7 +203,7 @@ impl Folds {
     /// [`ModelError::Folds`] for a class with a single row.
     pub fn inner(&self, rows: &[usize], classes: &Classes) -> crate::Result<Vec<Fold>> {
         let y = classes.indices();
-        let Some(groups) = &self.groups else {
+        let Some(groups) = self.choice_groups() else {
             let inside: Vec<usize> = rows.iter().map(|&row| y[row]).collect();
             let count = |class| inside.iter().filter(|&&c| c == class).count();
             let counts = (0..self.names.len()).map(|class| (count(class), class));
@@ -237,21 +260,92 @@ impl Folds {
     }
 }
 
-/// Refuses folds that hold out a part of a group; `is_named` says that the user chose the column.
+/// What parameters are chosen on where some fold trains on one group alone.
+#[derive(Clone, Debug)]
+struct Choice {
+    recordings: Vec<String>,
+    warning: String,
+}
+
+impl Choice {
+    /// The recordings, where they are needed.
+    fn of(
+        outer: &[Fold],
+        (column, groups): (&str, Option<&[String]>),
+        (recordings, table): (&str, &LabelledTable),
+    ) -> Result<Option<Self>> {
+        let Some(groups) = groups else { return Ok(None) };
+        let is_one = |fold: &&Fold| {
+            let mut trained = fold.train.iter().map(|&row| &groups[row]);
+            let first = trained.next();
+            trained.all(|group| Some(group) == first)
+        };
+        let Some(fold) = outer.iter().find(is_one) else { return Ok(None) };
+        let warning = format!(
+            "fold {} trains on one {column} alone, so inner folds hold out values of {recordings}: what is chosen may \
+             suit no other {column}",
+            fold.name
+        );
+        let recordings = groups::values(table, recordings, ELSE)?;
+        Ok(Some(Self { recordings, warning }))
+    }
+}
+
+/// Names the column that was not asked for in a refusal of too few groups.
+fn too_few(error: ModelError, column: Option<&str>) -> ModelError {
+    match (error, column) {
+        (ModelError::TooFewGroups { groups, folds }, Some(column)) => {
+            let reason = format!(
+                "rows that share a value of {column} stay together, and {groups} values are too few for {folds} \
+                 folds: ask for at most {groups}"
+            );
+            ModelError::Folds { reason }
+        }
+        (error, _) => error,
+    }
+}
+
+/// That rows of one recording, as far as it is known, are in both training and test.
+fn neighbours(
+    table: &LabelledTable,
+    target: (&Labels, &Classes),
+    outer: &[Fold],
+) -> Option<String> {
+    if table.ids.len() < 2 {
+        return None;
+    }
+    let is_one =
+        |column: &str| table.column(column).is_ok_and(|values| Labels::of(&values).0.len() == 1);
+    if is_one(RECORDING) || table.shared_ids().is_some_and(is_one) {
+        return Some(ONE_RECORDING.into());
+    }
+    let ids = table.shared_ids().filter(|ids| !groups::is_target(table, ids, target))?;
+    let values = table.column(ids).ok().filter(|values| splits_any(outer, values))?;
+    let why = match missing(&values) {
+        0 => "all rows of a class have the same one".into(),
+        rows => format!("{} without one", count(rows, "row")),
+    };
+    Some(format!(
+        "rows of one {ids} are in both training and test ({why}): if they are parts of one recording, the scores are \
+         better than they would be on other recordings"
+    ))
+}
+
+/// Refuses folds that hold out a part of a group; as groups, the column `allowed` would allow it.
 fn refuse_split(
     folds: &[Fold],
     groups: &[String],
     (plan, column): (&dyn fmt::Display, &str),
-    is_named: bool,
+    allowed: Option<&str>,
 ) -> Result<()> {
     let mut fold_of: HashMap<&str, &str> = HashMap::new();
     for fold in folds {
         for &row in &fold.test {
             let other = *fold_of.entry(&groups[row]).or_insert(&fold.name);
             if other != fold.name {
-                let remedy = match is_named {
-                    true => "--groups must not be split",
-                    false => "to allow this, name the groups with --groups",
+                let remedy = match allowed {
+                    None => "--groups must not be split".into(),
+                    Some(allowed) => format!("--groups {allowed} allows it"),
                 };
                 let reason = format!(
                     "{plan}: {column} {} is in the folds {other} and {}; {remedy}",
@@ -290,110 +384,4 @@ fn stratified(labels: &Labels, y: &[usize], k: usize, seed: u32) -> Result<Vec<F
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Four rows, r0 to r3, with these columns.
-    fn table<const N: usize>(columns: [(&str, [&str; 4]); N]) -> LabelledTable {
-        let owned = |values: [&str; 4]| values.map(String::from).to_vec();
-        let columns = columns.map(|(name, values)| (name.to_string(), owned(values)));
-        let ids = owned(["r0", "r1", "r2", "r3"]);
-        LabelledTable::of_columns(std::path::Path::new("x.npz"), ids, columns.to_vec())
-    }
-
-    #[test]
-    fn rows_without_a_group_or_fold_are_refused() {
-        let table = table([("y", ["a", "b", "a", "b"]), ("f", ["1", "", "2", "NaN"])]);
-        let (labels, classes) = table.classes("y").unwrap();
-        let folds = |plan: &str, groups| {
-            let plan: CvPlan = plan.parse().unwrap();
-            Folds::new(Some(&plan), &table, groups, (&labels, &classes), 0)
-        };
-        for (plan, groups) in [("fold=f", None), ("group=f", None), ("2", Some("f"))] {
-            let refused = folds(plan, groups).unwrap_err().to_string();
-            let expected = "2 rows without f of 4, the first is r1";
-            assert!(refused.contains(expected), "{plan}: {refused}");
-        }
-        assert!(folds("2", None).is_ok());
-    }
-
-    /// Windows of recordings: the recordings were the groups, not what contains them.
-    #[test]
-    fn containers_of_windows_are_groups() {
-        let windows = table([
-            ("y", ["a", "b", "a", "b"]),
-            ("recording", ["r1", "r2", "r3", "r4"]),
-            ("container", ["1", "1", "2", "2"]),
-        ]);
-        let (labels, classes) = windows.classes("y").unwrap();
-        let folds = |plan: Option<&CvPlan>, groups| {
-            Folds::new(plan, &windows, groups, (&labels, &classes), 0).unwrap()
-        };
-        let containers = Some(&["1", "1", "2", "2"].map(String::from)[..]);
-        assert_eq!(folds(None, None).dependent(), containers);
-        assert_eq!(folds(Some(&CvPlan::Group("container".into())), None).dependent(), containers);
-        assert_eq!(folds(None, Some("container")).dependent(), containers);
-        let choice = Folds::for_choice(&windows, None, (&labels, &classes), 0).unwrap();
-        assert_eq!(choice.groups(), containers);
-        let said = folds(Some(&CvPlan::K(2)), None).warnings(&classes).join(" ");
-        assert!(said.contains("--groups container"), "{said}");
-        // Of two usual columns the first is taken, whether or not it splits the other.
-        let both = table([
-            ("y", ["a", "b", "a", "b"]),
-            ("container", ["1", "1", "2", "2"]),
-            ("group", ["p", "q", "p", "q"]),
-            ("half", ["1", "2", "2", "1"]),
-        ]);
-        let (labels, classes) = both.classes("y").unwrap();
-        let said = |plan: Option<&CvPlan>| {
-            let found = Folds::new(plan, &both, None, (&labels, &classes), 0).unwrap();
-            found.warnings(&classes).join(" ")
-        };
-        let split = "rows of one group are in both training and test: --groups group";
-        assert!(said(None).contains(split), "{}", said(None));
-        let halves = said(Some(&CvPlan::Fold("half".into())));
-        assert!(halves.contains("the scores are not those of a new container"), "{halves}");
-        // A recording that belongs to two groups is split by them.
-        let odd = table([
-            ("y", ["a", "b", "a", "b"]),
-            ("recording", ["r1", "r1", "r2", "r2"]),
-            ("container", ["1", "2", "2", "1"]),
-        ]);
-        let (labels, classes) = odd.classes("y").unwrap();
-        let split = Folds::new(None, &odd, None, (&labels, &classes), 0).unwrap_err().to_string();
-        assert!(split.contains("recording r1 is in the folds 1 and 2"), "{split}");
-    }
-
-    #[test]
-    fn groups_that_a_plan_splits_are_said_and_the_target_is_none() {
-        let grouped = table([("container", ["a", "b", "a", "b"]), ("group", ["1", "1", "2", "2"])]);
-        let (labels, classes) = grouped.classes("container").unwrap();
-        let folds = |plan: Option<&CvPlan>, groups| {
-            Folds::new(plan, &grouped, groups, (&labels, &classes), 0).unwrap()
-        };
-        assert_eq!(folds(None, None).description, "each group once");
-        let said = folds(Some(&CvPlan::K(2)), None).warnings(&classes).join(" ");
-        assert!(
-            said.contains("one group are in both") && said.contains("--groups group"),
-            "{said}"
-        );
-        let kept = folds(Some(&CvPlan::K(2)), Some("group")).warnings(&classes).join(" ");
-        assert!(!kept.contains("--groups"), "{kept}");
-
-        // A target of this name was its own groups: each fold was of a class that no other had.
-        let sound = ["studio", "phone", "studio", "phone"];
-        let named = table([("recording", sound)]);
-        let (of_sound, sounds) = named.classes("recording").unwrap();
-        let found = Folds::new(Some(&CvPlan::K(2)), &named, None, (&of_sound, &sounds), 0).unwrap();
-        assert!(found.description.contains("stratified"), "{}", found.description);
-
-        let apart = table([("y", ["a", "b", "a", "b"]), ("group", ["1", "2", "3", ""])]);
-        let (y, of_y) = apart.classes("y").unwrap();
-        let whole = Folds::new(Some(&CvPlan::K(2)), &apart, None, (&y, &of_y), 0).unwrap();
-        assert!(!whole.warnings(&of_y).join(" ").contains("--groups"), "no group has two rows");
-
-        let by_group = folds(None, None);
-        let refused = by_group.inner(&[0, 1], &classes).unwrap_err().to_string();
-        assert!(refused.contains("all of one group") && refused.contains("--tune"), "{refused}");
-    }
-}
+mod tests;
