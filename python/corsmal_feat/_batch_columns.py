@@ -24,7 +24,7 @@ def scalars(values: Singles, rows: Flags) -> list[Any]:
     """One column for each column of `values`; `rows` says which rows have values."""
     pa = arrow()
     if rows.all():
-        # Views of one array: nothing is copied but to lay columns out one behind the other.
+        # Views of one array: nothing is copied but to lay columns out one after the other.
         return [pa.array(column) for column in np.ascontiguousarray(values.T)]
     whole = np.zeros((values.shape[1], len(rows)), dtype=np.float32)
     whole[:, rows] = values.T

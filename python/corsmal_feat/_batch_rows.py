@@ -34,10 +34,6 @@ def rows_of(batch: Any) -> list[Any]:
                 f"the column {name!r} must be called {name.lower()!r}; "
                 "a label must be called otherwise"
             )
-    # In an archive, `offset` is a place.
-    places = PLACE if PLACE[0] in names else ()
-    if refusal := _core.times_refusal([name for name in names if name not in places]):
-        raise ParameterError(refusal)
     if PATH not in names and BYTES not in names:
         raise ParameterError(f"batch needs a column path or bytes, but has only {', '.join(names)}")
 
@@ -59,6 +55,7 @@ def rows_of(batch: Any) -> list[Any]:
     )
     ids = column(ID, pa.string())
     starts, ends = column(START, pa.float64()), column(END, pa.float64())
+    _require_own_times(batch, starts, ends)
     firsts, lasts = (column(name, pa.uint64()) for name in PIECE)
     rows = []
     for i in range(batch.num_rows):
@@ -82,6 +79,32 @@ def rows_of(batch: Any) -> list[Any]:
             )
         rows.append((name, source, starts[i], ends[i], piece))
     return rows
+
+
+def _require_own_times(batch: Any, starts: list[Any], ends: list[Any]) -> None:
+    """Refuses rows with times in other columns than `start` and `end`."""
+    names = batch.schema.names
+    # In an archive, `offset` is a place.
+    own = {ID, PATH, BYTES, START, END, *PIECE, *(PLACE if PLACE[0] in names else ())}
+    halves = ((True, True, False), (True, False, True))
+    columns = {
+        name: batch.column(name).to_pylist()
+        for name in names
+        if name not in own and any(_core.times_refusal(half, [name]) for half in halves)
+    }
+    any_column = START in names or END in names
+    for i in range(batch.num_rows if columns else 0):
+        numbers = [name for name, values in columns.items() if _is_number(values[i])]
+        given = (any_column, starts[i] is not None, ends[i] is not None)
+        if refusal := _core.times_refusal(given, numbers):
+            raise ParameterError(f"row {i}: {refusal}")
+
+
+def _is_number(value: Any) -> bool:
+    try:
+        return bool(np.isfinite(float(value)))
+    except (TypeError, ValueError):
+        return False
 
 
 #: Stores that this process has asked for an object.

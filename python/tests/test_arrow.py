@@ -242,8 +242,14 @@ def test_jobs_that_cannot_be(recordings: list[Path]):
     refused("needs a column path", batch.drop_columns(["path"]))
     refused("rename it", batch.append_column("status", batch["id"]))
     refused("must be called 'start'", batch.append_column("Start", batch["id"]))
-    onset = batch.append_column("onset", batch["id"])
-    refused("read from columns `start` and `end`", onset.append_column("offset", batch["id"]))
+    seconds = pa.array([None] * (batch.num_rows - 1) + [0.5])
+    onset = batch.append_column("onset", seconds)
+    last = batch.num_rows - 1
+    refused(f"row {last}: .* from columns `start` and", onset.append_column("offset", seconds))
+    refused(
+        "if .length. is a label",
+        batch.append_column("start", seconds).append_column("length", seconds),
+    )
     refused("two columns with the same name", batch.append_column("id", batch["id"]))
     refused("must begin with one of s3://", pa.RecordBatch.from_pydict({"path": ["ftp://b/x.wav"]}))
     refused(

@@ -117,7 +117,7 @@ def main() -> int:
                 child.wait()
                 read = sum(count == opens for count in opened.take().values())
                 if out.exists():
-                    # The next run removes the ledger of one that was killed behind its last step.
+                    # The next run removes the ledger of one that was killed after its last step.
                     subprocess.run([*command, "--out", str(out)], check=True)
                     opened.take()
                     failed |= out.read_bytes() != whole.read_bytes() or done(out) > 0

@@ -9,13 +9,13 @@ use crate::source::{AudioSpec, BlockSource};
 /// Keeps the last samples of a source, so that stretches that overlap are decoded once.
 pub struct Replay {
     source: Box<dyn BlockSource>,
-    /// Interleaved; behind them the source goes on.
+    /// Interleaved; after them the source goes on.
     kept: Vec<f32>,
     /// The frame that is read next.
     position: u64,
     /// Whether the source was asked for more than it has.
     ended: bool,
-    /// What was met behind the frames that were given last.
+    /// What was met after the frames that were given last.
     failed: Option<AudioError>,
 }
 
@@ -50,7 +50,7 @@ impl Replay {
         self.kept.capacity()
     }
 
-    /// Keeps nothing of what was read: only stretches behind it are served.
+    /// Keeps nothing of what was read: only stretches after it are served.
     pub fn forget(&mut self) {
         self.kept = Vec::new();
         self.position = self.reached();

@@ -7,7 +7,7 @@ use crate::tags;
 
 /// Bytes before the audio that are searched for its beginning, tags not counted.
 const SEARCHED: usize = 64 << 10;
-/// Bytes behind them that show a chain of frames which begins in them.
+/// Bytes after them that show a chain of frames which begins in them.
 #[cfg(feature = "symphonia")]
 const CHAIN: usize = if crate::aac::WINDOW > crate::mpeg::WINDOW {
     crate::aac::WINDOW / 2
@@ -68,7 +68,7 @@ const OTHERS: [(usize, &[u8], &str); 23] = [
     (8, b"8SVX", "8SVX"),
 ];
 
-/// Goes to the first byte of the audio: behind tags and, where nothing known starts the file, behind
+/// Goes to the first byte of the audio: after tags and, where nothing known starts the file, after
 /// what is not audio. `None` where no format is recognised.
 pub(crate) fn find(input: &mut Input) -> Result<Option<Format>, AudioError> {
     tags::skip(input)?;
@@ -80,7 +80,7 @@ pub(crate) fn find(input: &mut Input) -> Result<Option<Format>, AudioError> {
     let shown = &shown[..shown.len().min(SEARCHED + CHAIN)];
     let is_end = shown.len() < SEARCHED + CHAIN;
     let sure = (0..shown.len()).find_map(|at| Some((at, surely(&shown[at..])?)));
-    // What begins first counts; the other stands behind the audio, or in it.
+    // What begins first counts; the other stands after the audio, or in it.
     let found = [sure, frames(shown, is_end)].into_iter().flatten().min_by_key(|(at, _)| *at);
     if let Some((at, format)) = found.filter(|(at, _)| *at < SEARCHED) {
         input.consume(at);
@@ -88,7 +88,7 @@ pub(crate) fn find(input: &mut Input) -> Result<Option<Format>, AudioError> {
     }
     #[cfg(feature = "symphonia")]
     if input.position() > 0 || crate::mpeg::is_header(input.peek(4)?) {
-        // A tag and nothing behind it, or a frame header and no whole frame.
+        // A tag and nothing after it, or a frame header and no whole frame.
         return Ok(Some(Format::Mpeg));
     }
     Ok(None)

@@ -42,7 +42,7 @@ pub(crate) struct StreamSource<S> {
     start: usize,
     /// Frames of silence that come before anything else.
     silence: u64,
-    /// What was met behind the samples that were handed out last.
+    /// What was met after the samples that were handed out last.
     failed: Option<AudioError>,
     report: ReadReport,
 }

@@ -1,4 +1,4 @@
-//! Tags that stand before, between and behind the audio of any format: ID3v2, ID3v1, APEv2.
+//! Tags that stand before, between and after the audio of any format: ID3v2, ID3v1, APEv2.
 
 use crate::error::AudioError;
 use crate::input::Input;

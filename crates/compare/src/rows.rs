@@ -36,7 +36,7 @@ pub(super) struct RowPairs {
 
 impl RowPairs {
     /// The rows that belong together of arrays that have a row for each id of their files. The rows of arrays of
-    /// `complex` numbers are behind a first axis of real and imaginary parts.
+    /// `complex` numbers are after a first axis of real and imaginary parts.
     pub(super) fn taken<T: Clone>(
         &self,
         (x, y): &(ArrayD<T>, ArrayD<T>),

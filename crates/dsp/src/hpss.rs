@@ -323,7 +323,7 @@ impl HarmonicPart {
         let parts = &mut [(Part::Harmonic, part.as_mut_slice())];
         self.separator.separate(y, parts, work, observe)?;
         if self.librosa == LibrosaVersion::V08 {
-            // It inverted without a length and filled up with zeros behind the last frame's centre.
+            // It inverted without a length and filled up with zeros after the last frame's centre.
             let stft = self.separator.forward.params();
             part[stft.hop_length * (stft.n_frames(y.len()) - 1)..].fill(0.0);
         }

@@ -113,7 +113,7 @@ impl Pcen {
     }
 
     /// `[channels, bands, frames]` of a spectrogram of that shape, and the states `[channels, bands]`
-    /// behind its last frame. `levels` replaces what is smoothed, `state` begins where an earlier
+    /// after its last frame. `levels` replaces what is smoothed, `state` begins where an earlier
     /// part of the signal ended. Double precision, as librosa's result is.
     ///
     /// # Errors

@@ -6,6 +6,7 @@ use std::path::absolute;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use corsmal_audio::Repair;
 use corsmal_files::spelling;
 
 use crate::inputs::{Input, InputError, InputSource};
@@ -48,11 +49,11 @@ impl Windows {
             let (number, first) = missing.as_ref()?;
             let of = match number {
                 1 => String::new(),
-                number => format!(" (the first of {number} such {what})"),
+                number => format!(", the first of {number} such {what}"),
             };
-            Some(format!("{first}{of}: what is missing has no windows"))
+            Some(format!("{first}{of}; what is missing has no windows"))
         };
-        let cut_short = told(&self.cut_short, "recordings");
+        let cut_short = told(&self.cut_short, "inputs");
         cut_short.into_iter().chain(told(&self.beyond, "stretches")).collect()
     }
 }
@@ -191,14 +192,19 @@ fn of_recording(
         let (start, end) = (first as f64 / rate, (first + window) as f64 / rate);
         windows.inputs.push(labelled(input, id, Some(start), Some(end)));
     }
-    match &length.cut_short {
-        _ if wanted <= there => {}
-        Some(repair) => note(&mut windows.cut_short, || format!("{}: {repair}", input.id)),
-        None if wanted < u64::MAX => note(&mut windows.beyond, || {
-            let (end, there) = (wanted as f64 / rate, there as f64 / rate);
+    let until = |end: u64| (end.saturating_sub(base + window) / hop).saturating_add(1);
+    match (&length.cut_short, input.end) {
+        (Some(Repair::Truncated { declared: Some(declared), .. }), _)
+            if until(wanted.min(*declared)) == count => {}
+        (_, Some(_)) if until(wanted) == count => {}
+        (Some(repair), _) => {
+            note(&mut windows.cut_short, || format!("{}: {repair}", input.id));
+        }
+        (None, Some(end)) => note(&mut windows.beyond, || {
+            let there = seconds(there, rate);
             format!("{}: the stretch ends at {end} s, its recording at {there} s", input.id)
         }),
-        None => {}
+        (None, None) => {}
     }
     Ok(())
 }

@@ -19,7 +19,7 @@ use serde_json::Value;
 
 use crate::inputs::cells::require_cells;
 use crate::inputs::error::InputError;
-use crate::inputs::times::{END, START, times_refusal};
+use crate::inputs::times::{END, Given, Role, START, is_number, refusal_of};
 
 /// File name extensions of manifests, lower case.
 pub const EXTENSIONS: [&str; 3] = ["csv", "jsonl", "ndjson"];
@@ -91,6 +91,8 @@ fn open(path: &Path) -> Result<BufReader<Short<File>>, InputError> {
 struct ManifestColumns {
     places: HashMap<String, usize>,
     labels: Vec<(usize, String)>,
+    /// Which of the labels are called like times.
+    times: Vec<(usize, Role)>,
     /// Bytes of the names of labels.
     bytes: usize,
 }
@@ -115,17 +117,24 @@ impl ManifestColumns {
         }
         self.places.insert(name.into(), place);
         if ![PATH, ID, START, END].contains(&name) {
+            self.times.extend(Role::of(name).map(|role| (self.labels.len(), role)));
             self.labels.push((place, name.into()));
             self.bytes += name.len();
         }
         Ok(place)
     }
 
-    /// Refuses other names for the times of stretches. Gives the places of both columns.
-    fn check_times(&self) -> Result<(), ([usize; 2], String)> {
-        let mut names = vec![""; self.places.len()];
-        self.places.iter().for_each(|(name, place)| names[*place] = name);
-        times_refusal(&names).map_or(Ok(()), Err)
+    /// Why a row has other times than are read.
+    fn misread(&self, row: &Entry) -> Option<String> {
+        if self.times.is_empty() {
+            return None;
+        }
+        let times = self.times.iter().map(|(at, role)| (&row.labels[*at], *role));
+        let numbers = times.filter(|((_, value), _)| is_number(value));
+        let others: Vec<_> = numbers.map(|((name, _), role)| (name.as_str(), role)).collect();
+        let (start, end) = (row.start.is_some(), row.end.is_some());
+        let any_column = [START, END].into_iter().any(|own| self.places.contains_key(own));
+        refusal_of(Given { any_column, start, end }, &others)
     }
 
     /// Refuses more than so many rows should hold.
@@ -163,7 +172,11 @@ impl ManifestColumns {
         let id = given(ID);
         let written = given(PATH).ok_or_else(|| wrong(manifest, line, "no path"))?;
         let path = manifest.parent().unwrap_or(Path::new("")).join(&written);
-        Ok(Entry { line, written, path, id, start, end, labels })
+        let entry = Entry { line, written, path, id, start, end, labels };
+        match self.misread(&entry) {
+            Some(reason) => Err(wrong(manifest, line, reason)),
+            None => Ok(entry),
+        }
     }
 }
 
@@ -190,7 +203,6 @@ fn csv_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
         }
         cells.push(index);
     }
-    columns.check_times().map_err(|(_, reason)| wrong(path, 1, reason))?;
     if !columns.places.contains_key(PATH) {
         let names: Vec<&str> = columns.labels.iter().map(|(_, name)| name.as_str()).collect();
         let likely = names.iter().find(|name| corsmal_names::names_files(name));
@@ -245,12 +257,6 @@ fn json_rows(path: &Path) -> Result<Vec<Entry>, InputError> {
         rows.push((line, cells));
         columns.require(rows.len()).map_err(|e| wrong(path, line, e))?;
     }
-    columns.check_times().map_err(|(places, reason)| {
-        let first =
-            |place| rows.iter().find(|(_, cells)| cells.iter().any(|(own, _)| *own == place));
-        let lines = places.into_iter().filter_map(first).map(|(line, _)| *line);
-        wrong(path, lines.max().unwrap_or(1), reason)
-    })?;
     let mut values = vec![String::new(); columns.places.len()];
     let entries = rows.into_iter().map(|(line, cells)| {
         values.iter_mut().for_each(String::clear);
@@ -359,6 +365,11 @@ mod tests {
         let path = folder.path().join("list.csv");
         std::fs::write(&path, "path,onset,offset,start,end\na.wav,1,2,1,2\n").unwrap();
         assert_eq!(read(&path).unwrap()[0].start, Some(1.0));
+        // Empty cells are none, and labels that are no numbers are no times.
+        let text = refusal("list.csv", "path,start,end,duration\na.wav,1,2,1\na.wav,2,,1\n");
+        assert!(text.contains(", line 3:") && text.contains("\"duration\" is a label"), "{text}");
+        std::fs::write(&path, "path,start,length\na.wav,1,12cm\n").unwrap();
+        assert_eq!(read(&path).unwrap()[0].labels[0].1, "12cm");
     }
 
     /// Two numbers became one label.

@@ -291,7 +291,7 @@ proptest! {
     }
 }
 
-/// Every registered feature by itself with its defaults; derived ones behind their source.
+/// Every registered feature by itself with its defaults; derived ones after their source.
 fn each_feature(channels: usize) -> Vec<(&'static str, Arc<Plan>)> {
     let plan = |kind: &'static str| {
         let mut features = serde_json::Map::new();

@@ -8,8 +8,13 @@ pub fn plain(path: &str) -> String {
     if path.contains("://") {
         return path.into();
     }
+    plain_path(Path::new(path)).to_string_lossy().into_owned()
+}
+
+/// As [`plain`], of a path that is no address.
+pub fn plain_path(path: &Path) -> PathBuf {
     let mut plain = PathBuf::new();
-    for part in Path::new(path).components() {
+    for part in path.components() {
         match part {
             Component::CurDir => {}
             Component::ParentDir if plain.file_name().is_some() => {
@@ -18,7 +23,7 @@ pub fn plain(path: &str) -> String {
             part => plain.push(part),
         }
     }
-    plain.to_string_lossy().into_owned()
+    plain
 }
 
 #[cfg(test)]

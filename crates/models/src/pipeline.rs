@@ -83,7 +83,7 @@ pub struct Pipeline {
 }
 
 impl Pipeline {
-    /// A classifier behind the steps whose results it was trained on.
+    /// A classifier after the steps whose results it was trained on.
     ///
     /// # Errors
     /// [`ModelError::Inconsistent`] where one part gives another number of features than the next
@@ -142,7 +142,7 @@ impl Pipeline {
         self.classifier.decision_function(self.through_steps(x)?.view())
     }
 
-    /// The `k` nearest training rows, behind the steps: see [`Classifier::neighbours`].
+    /// The `k` nearest training rows, after the steps: see [`Classifier::neighbours`].
     ///
     /// # Errors
     /// As [`Pipeline::predict`]; [`ModelError::Lacks`] for any but
@@ -152,7 +152,7 @@ impl Pipeline {
         self.classifier.neighbours(x.as_ref().map(|x| x.view()), k)
     }
 
-    /// The classifier behind the steps.
+    /// The classifier after the steps.
     pub fn classifier(&self) -> &Classifier {
         &self.classifier
     }

@@ -1,4 +1,4 @@
-//! linfa's own algorithms behind `solver = "linfa"` and `algorithm = "linfa"`.
+//! linfa's own algorithms after `solver = "linfa"` and `algorithm = "linfa"`.
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 

@@ -31,7 +31,7 @@ impl Column {
         Self { values: Vec::with_capacity(items.saturating_mul(numbers)), offsets: vec![0] }
     }
 
-    /// Adds an item behind the others.
+    /// Adds an item after the others.
     pub fn push(&mut self, item: &[f32]) {
         self.values.extend_from_slice(item);
         self.offsets.push(self.values.len());

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use corsmal_extract::engine::{FeatureArray, Plan};
-use corsmal_extract::inputs::{self, Input, InputSource, Member, Place};
+use corsmal_extract::inputs::{self, Given, Input, InputSource, Member, Place};
 use corsmal_extract::run::{Piece, Recordings, RunError as Stopped};
 use corsmal_extract::survey::{Header, headers};
 use ndarray::{Array2, Array3};
@@ -211,11 +211,13 @@ pub(crate) fn lengths(py: Python<'_>, rows: Vec<Row>) -> PyResult<Vec<Option<(u3
     Ok(found.into_iter().map(|header| header.and_then(known)).collect())
 }
 
-/// Why stretches with these columns would be others than meant.
+/// Why the stretch in a row would be another than meant: whether there is a column `start` or `end`, whether
+/// the row has them, and the columns in which it has numbers.
 #[pyfunction]
-pub(crate) fn times_refusal(names: Vec<String>) -> Option<String> {
+pub(crate) fn times_refusal(given: (bool, bool, bool), names: Vec<String>) -> Option<String> {
+    let (any_column, start, end) = given;
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    inputs::times_refusal(&names).map(|(_, reason)| reason)
+    inputs::times_refusal(Given { any_column, start, end }, &names)
 }
 
 /// Refuses the store of an object where nothing in it can be asked for.

@@ -30,7 +30,7 @@ pub enum StoreError {
     /// The request failed, and so did every further try.
     #[error("the store failed: {0}")]
     Failed(String),
-    /// The range lies behind the end of the object.
+    /// The range lies after the end of the object.
     #[error("the object ends before the requested bytes")]
     Beyond,
     /// The server cannot do what is needed.

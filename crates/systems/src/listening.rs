@@ -203,7 +203,7 @@ impl<'a> Listener<'a> {
                     let start = input.start.unwrap_or(0.0);
                     let windows = self.front_end.windows;
                     let second = |frame: usize| start + windows.map_or(0.0, |w| w.seconds(frame));
-                    // A window may be filled up behind the end.
+                    // A window may be filled up after the end.
                     let end = seconds.map_or(f64::INFINITY, |seconds| start + seconds);
                     let one = |(frames, proba): Heard| {
                         let span = frames.map(|f| (second(f.start), second(f.end).min(end)));

@@ -163,7 +163,7 @@ mod tests {
             window_type(&subject, start)
         };
         let poured = Some(Some((1.0, 2.0)));
-        // 1 s is frame 100: it must lie before frame 48 of the window, 2 s behind its frame 16.
+        // 1 s is frame 100: it must lie before frame 48 of the window, 2 s after its frame 16.
         assert_eq!(of(poured, 52), 0);
         assert_eq!(of(poured, 53), 2);
         assert_eq!(of(poured, 183), 2);

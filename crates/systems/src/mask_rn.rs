@@ -29,7 +29,7 @@ pub(crate) const MASK_RN: Definition = Definition {
 
 /// Views, each of which answers alone.
 const VIEWS: usize = 4;
-/// Classes behind the levels and types: the last says that the container is opaque.
+/// Classes after the levels and types: the last says that the container is opaque.
 const LEVELS: usize = FillingLevel::ALL.len();
 const TYPES: usize = FillingType::ALL.len();
 

@@ -78,7 +78,7 @@ pub(crate) fn points(view: &DepthView<'_>) -> Result<Vec<[f64; 3]>> {
 pub fn upright_box(views: &[DepthView<'_>]) -> Result<UprightBox> {
     let mut cloud = Vec::new();
     for view in views {
-        // Edges mix the object with what is behind it.
+        // Edges mix the object with what is after it.
         let mask = view.mask.eroded();
         cloud.extend(points(&DepthView { mask: &mask, ..*view })?);
     }

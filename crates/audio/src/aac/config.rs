@@ -105,7 +105,7 @@ pub(super) fn rate_of(index: u32) -> u32 {
     SAMPLE_RATES.get(index as usize).copied().unwrap_or(0)
 }
 
-/// What a decoder of AAC-LC alone would leave out, where that is said behind the configuration.
+/// What a decoder of AAC-LC alone would leave out, where that is said after the configuration.
 fn extension(bits: &mut Bits<'_>) -> Option<&'static str> {
     if bits.take(11)? != SBR_SYNC || object_type(bits)? != SBR || bits.take(1)? == 0 {
         return None;

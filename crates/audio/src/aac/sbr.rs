@@ -1,6 +1,6 @@
 //! Whether packets carry spectral band replication that no header speaks of.
 //!
-//! It stands in a fill element behind the channels, and where those end only their decoder knows. So
+//! It stands in a fill element after the channels, and where those end only their decoder knows. So
 //! the fill element is looked for from the end of the packet backwards, and the decoder then says
 //! whether the channels end where it begins.
 

@@ -79,7 +79,7 @@ pub(super) fn starts(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC)
 }
 
-/// Whether another stream starts here, behind the frames of one.
+/// Whether another stream starts here, after the frames of one.
 pub(super) fn continues(bytes: &[u8]) -> bool {
     matches!(bytes, [b'f', b'L', b'a', b'C', 0 | 0x80, 0, 0, n, ..] if usize::from(*n) == LENGTH)
 }

@@ -226,7 +226,7 @@ impl FlacStream {
         Ok(None)
     }
 
-    /// The first sample of a frame, behind which the input stands, by its own count.
+    /// The first sample of a frame, after which the input stands, by its own count.
     fn start(&mut self, header: &Header) -> Result<u64, AudioError> {
         let number = match header.number {
             Number::Sample(n) => return Ok(n),
@@ -250,7 +250,7 @@ impl FlacStream {
         Ok(number * u64::from(block))
     }
 
-    /// Samples per channel that are missing before a frame, behind which the input stands.
+    /// Samples per channel that are missing before a frame, after which the input stands.
     fn gap(&mut self, header: &Header, report: &mut ReadReport) -> Result<u64, AudioError> {
         let start = self.start(header)?;
         let before = self.part.next.replace(start + u64::from(header.block));

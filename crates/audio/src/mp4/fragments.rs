@@ -44,7 +44,7 @@ impl Run {
         })
     }
 
-    /// The byte behind the last packet.
+    /// The byte after the last packet.
     fn end(&self) -> u64 {
         let sizes = match self.size_at {
             Some(at) => {
@@ -68,7 +68,7 @@ pub(super) struct Fragments {
 }
 
 impl Fragments {
-    /// The box behind the movie begins at `boundary`.
+    /// The box after the movie begins at `boundary`.
     pub(super) fn new(defaults: Defaults, base: u64, boundary: u64) -> Self {
         Self { defaults, base, boundary: Some(boundary), runs: VecDeque::new() }
     }

@@ -1,4 +1,4 @@
-//! Where the index of a file is, before or behind its packets.
+//! Where the index of a file is, before or after its packets.
 
 use super::boxes::{self, Head};
 use crate::error::AudioError;
@@ -39,8 +39,8 @@ pub(super) fn hold(input: &mut Input) -> Result<(), AudioError> {
     Err(AudioError::unsupported(at, actual, "a file, or the index first (-movflags +faststart)"))
 }
 
-/// Reads the index, and goes to the box behind it. Also gives the first byte at which packets can be
-/// that are of use: behind the index, unless packets stand before it.
+/// Reads the index, and goes to the box after it. Also gives the first byte at which packets can be
+/// that are of use: after the index, unless packets stand before it.
 pub(super) fn index(input: &mut Input) -> Result<(Vec<u8>, u64), AudioError> {
     let base = input.position();
     let mut has_data = false;

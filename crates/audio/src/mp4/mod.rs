@@ -1,6 +1,6 @@
 //! MP4, M4A and QuickTime: packets are found here and decoded by symphonia (AAC-LC, ALAC).
 //!
-//! The edit list says which of the samples are the recording: what an encoder put before and behind
+//! The edit list says which of the samples are the recording: what an encoder put before and after
 //! it is dropped.
 
 mod boxes;

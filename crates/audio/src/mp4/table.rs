@@ -147,7 +147,7 @@ impl Table {
         (total.saturating_add(packets), last.filter(|_| is_regular && left == 0))
     }
 
-    /// Whether the packets behind byte `floor` follow each other in the file.
+    /// Whether the packets after byte `floor` follow each other in the file.
     pub(super) fn is_in_order(&self, floor: u64) -> bool {
         let mut chunks = Chunks::new(self);
         let mut end = floor;

@@ -71,7 +71,7 @@ impl Frames {
             report.note(Repair::PartialFrame { bytes });
             return Ok(None);
         }
-        // Another recording may begin behind other bytes, which then took no time.
+        // Another recording may begin after other bytes, which then took no time.
         let is_tag = foreign.bytes > 0 && Tag::parse(&shown[..header.size], &header).is_some();
         self.missing = if is_tag { 0 } else { self.missing_in(&foreign, &header) };
         if foreign.bytes > 0 && first.is_some() {

@@ -87,7 +87,7 @@ impl Repacker {
         Some(&self.packet)
     }
 
-    /// The main data of the frame behind the history.
+    /// The main data of the frame after the history.
     fn main_data(&self, header: &Header, frame: &[u8]) -> Option<Vec<u8>> {
         let side = SideInfo::parse(side_info(header, frame)?, header)?;
         let own = &frame[payload(header, frame)..];

@@ -129,7 +129,7 @@ impl Header {
             && self.channels == other.channels
     }
 
-    /// Bytes of side information behind the header of layer 3.
+    /// Bytes of side information after the header of layer 3.
     pub(crate) fn side_info(&self) -> usize {
         match (self.mpeg1, self.channels) {
             (true, 1) | (false, 2) => 17,

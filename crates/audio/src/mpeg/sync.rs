@@ -1,4 +1,4 @@
-//! Where frames begin: in front of, between and behind what is not audio.
+//! Where frames begin: in front of, between and after what is not audio.
 
 use super::header::{HEADER, Header, MAX_FRAME};
 use crate::tags;
@@ -92,7 +92,7 @@ fn find_free_where(buffer: &[u8], admits: impl Fn(&Header) -> bool) -> Option<(u
 }
 
 /// Where frames begin that continue those of `first` but for their format: free with another size
-/// than `free`, or standard behind free. With the size of frames of free format from there on, or 0.
+/// than `free`, or standard after free. With the size of frames of free format from there on, or 0.
 pub(super) fn find_other_format(
     buffer: &[u8],
     is_end: bool,

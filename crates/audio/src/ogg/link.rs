@@ -68,7 +68,7 @@ pub(super) fn is_read(page: &Page) -> bool {
 
 impl Link {
     /// Reads the headers of the first stream that is read among those that begin with `page` and
-    /// the first pages behind it. `packets` receives those behind the headers; `page` is the one
+    /// the first pages after it. `packets` receives those after the headers; `page` is the one
     /// in which the headers end.
     pub(super) fn open(
         input: &mut Input,

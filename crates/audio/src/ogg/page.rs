@@ -135,7 +135,7 @@ pub(super) fn last_granule(input: &mut Input, serial: u32) -> Result<Option<i64>
     let mut page = Page::default();
     let mut last = None;
     while page.read(input)? {
-        // Another stream behind this one has its own positions.
+        // Another stream after this one has its own positions.
         last = page.granule.filter(|_| page.serial == serial);
     }
     input.seek(back)?;

@@ -50,7 +50,7 @@ impl Adpcm {
     }
 }
 
-/// Finds the byte at which more samples begin behind so many bytes of them.
+/// Finds the byte at which more samples begin after so many bytes of them.
 pub(super) type More = fn(&mut Input, u64) -> Result<Option<u64>, AudioError>;
 
 /// The blocks of one recording.
@@ -85,9 +85,9 @@ impl Blocks {
 }
 
 impl Blocks {
-    /// Notes samples behind those of the header, of whose `rest` bytes no block was made.
+    /// Notes samples after those of the header, of whose `rest` bytes no block was made.
     fn note_more(&mut self, rest: u64, report: &mut ReadReport) {
-        // A pipe may stay open behind its samples.
+        // A pipe may stay open after its samples.
         let whole = self.input.len().is_some() && self.left.is_some_and(|left| left == rest);
         let Some(size) = self.size.filter(|_| whole && !report.truncated) else { return };
         let more = self.input.skip(rest).and_then(|_| (self.more)(&mut self.input, size));

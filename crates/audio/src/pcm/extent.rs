@@ -107,6 +107,12 @@ pub(super) fn is_placeholder(input: &Input, format: &Format, size: u64, all: u64
     (size == all || size == whole) && available.is_none_or(|there| there < size)
 }
 
+/// As [`is_placeholder`], where `all` is no whole number of frames, so that no recording has it.
+pub(super) fn is_no_size(input: &Input, format: &Format, size: u64, all: u64) -> bool {
+    let is_whole = all.is_multiple_of(format.unit_bytes().max(1));
+    size == all && !is_whole && is_placeholder(input, format, size, all)
+}
+
 /// A chunk before the samples at byte `at` that claims more bytes than the file has.
 pub(super) fn beyond_end(at: u64, name: &[u8], size: u64) -> AudioError {
     let name = name.escape_ascii();

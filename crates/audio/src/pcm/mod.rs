@@ -141,7 +141,7 @@ impl PcmSource {
         if rest > 0 {
             self.report.note(Repair::PartialFrame { bytes: rest });
         }
-        // A pipe may stay open behind its samples.
+        // A pipe may stay open after its samples.
         let Some(size) = self.declared_len.filter(|_| self.seekable()) else {
             return;
         };
@@ -156,7 +156,7 @@ impl PcmSource {
     }
 }
 
-/// The byte at which another recording begins, behind no more than padding.
+/// The byte at which another recording begins, after no more than padding.
 fn another(input: &mut Input) -> Result<Option<u64>, AudioError> {
     const PADDING: usize = 8;
     let at = input.position();

@@ -1,6 +1,8 @@
 //! WAV (RIFF, RIFX, RF64, BW64): finds `fmt ` and `data`, repairs what the policy allows.
 
-use super::extent::{Extent, Sizes, beyond_end, is_placeholder, is_really_empty, to_end};
+use super::extent::{
+    Extent, Sizes, beyond_end, is_no_size, is_placeholder, is_really_empty, to_end,
+};
 use super::format::{Endian, Format};
 use super::header::Header;
 use crate::error::AudioError;
@@ -12,6 +14,9 @@ const MAX_CHUNKS: usize = 4096;
 
 /// Data sizes of writers that could not know: SoX and arecord, into a pipe.
 const STREAMED: [u64; 2] = [0x7fff_f000, 0x7fff_ff00];
+/// What others put there: the largest number, perhaps without the 36 bytes before the data. Recordings that a
+/// recorder has split are nearly as long.
+const LARGEST: [u64; 3] = [0x7fff_ffff, 0x7fff_ffdb, 0xffff_ffdb];
 
 /// Chunk names that decide whether an odd chunk was padded, where both readings are possible.
 const KNOWN: [&[u8; 4]; 24] = [
@@ -95,6 +100,7 @@ fn finish(
     }
     let plain = matches!(&form, b"RIFF" | b"RIFX") && long_size.is_none();
     unknown |= plain && STREAMED.iter().any(|all| is_placeholder(input, &format, declared, *all));
+    unknown |= plain && LARGEST.iter().any(|all| is_no_size(input, &format, declared, *all));
     if let (true, false, Some(there)) = (plain, unknown, available)
         && there.saturating_sub(declared) >= 1 << 32
     {
@@ -150,7 +156,7 @@ fn is_unpadded(next: &[u8; 5]) -> bool {
 }
 
 /// The byte at which more samples begin, in another data chunk or another WAV file; the input shows
-/// the byte behind the samples, `size` bytes of them.
+/// the byte after the samples, `size` bytes of them.
 pub(super) fn more_data(
     input: &mut Input,
     size: u64,

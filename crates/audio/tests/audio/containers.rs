@@ -132,7 +132,7 @@ fn core_audio_format() {
     check(&caf(2, &little(), 200), "caf pcm_s16le", &["truncated"]);
 }
 
-/// Metadata behind no samples were samples.
+/// Metadata after no samples were samples.
 #[test]
 fn core_audio_without_samples() {
     let info = b"info\0\0\0\0\0\0\0\x10\0\0\0\x01title\0hello\0";
@@ -215,7 +215,7 @@ fn adpcm_is_that_of_libsndfile() {
         let cut = read_file(wav[..wav.len() - 101].to_vec()).unwrap();
         assert!(cut.report.truncated && !cut.samples.is_empty());
         assert_eq!(cut.samples, expected[..cut.samples.len()]);
-        // Samples behind them.
+        // Samples after them.
         for second in [&b"data\x04\0\0\0\x01\0\x02\0"[..], wav] {
             let more = read_file([wav, second].concat()).unwrap();
             assert_eq!(more.report.repairs, [Repair::MoreData { offset: wav.len() as u64 }]);

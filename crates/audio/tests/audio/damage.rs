@@ -143,7 +143,7 @@ fn samples_of_wav_that_are_not_read_are_said() {
         let got = read_file(bytes.clone()).unwrap();
         assert_eq!(got.report.repairs, [Repair::MoreData { offset: at as u64 }]);
         assert_eq!(got.samples, plain.samples);
-        // A pipe may stay open, so nothing is looked for behind its samples.
+        // A pipe may stay open, so nothing is looked for after its samples.
         assert_eq!(read_pipe(bytes).unwrap().samples, plain.samples);
     }
     for tail in [list.as_slice(), b"data\0\0\0\0", b"da"] {

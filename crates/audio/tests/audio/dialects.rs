@@ -60,8 +60,16 @@ fn sizes_of_writers_into_pipes_are_no_claims() {
         assert_eq!((got.repairs(), got.declared_frames), (vec!["data_size_unknown"], None));
         assert_eq!(got.samples, expected()[..6]);
     }
-    let got = read_both(&Wav { data_size: Some(0x7fff_f004), ..wav() });
-    assert_eq!(got.repairs(), ["truncated"]);
+    // The largest number is no size where it is no whole number of frames.
+    for size in [0x7fff_ffff, 0x7fff_ffdb, 0xffff_ffdb] {
+        let wav = Wav { data_size: Some(size), ..Wav::pcm16(2, &SAMPLES[..6]) };
+        let got = read_both(&wav);
+        assert_eq!((got.repairs(), got.declared_frames), (vec!["data_size_unknown"], None));
+    }
+    for size in [0x7fff_f004, 0xffff_ffd8] {
+        let got = read_both(&Wav { data_size: Some(size), ..wav() });
+        assert_eq!(got.repairs(), ["truncated"]);
+    }
 }
 
 #[test]

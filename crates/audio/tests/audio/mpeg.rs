@@ -1,4 +1,4 @@
-//! MPEG audio with other bytes between and behind its frames.
+//! MPEG audio with other bytes between and after its frames.
 
 use crate::common::read_pipe;
 use crate::compressed::MP3;

@@ -173,7 +173,7 @@ impl Kept {
     }
 }
 
-/// How many training recordings have no annotation of their action, or one behind their end, in words.
+/// How many training recordings have no annotation of their action, or one after their end, in words.
 pub(super) fn uncropped(training: &[Target], actions: &Actions) -> Vec<String> {
     let action = |target: &&Target| {
         let key = target.recording.container.zip(target.recording.name);

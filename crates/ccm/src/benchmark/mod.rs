@@ -59,31 +59,32 @@ pub struct CapacityTable {
 
 impl CapacityTable {
     /// What makes the training scores too good.
-    fn caution(&self) -> Option<String> {
+    fn caution(&self) -> Result<Option<String>> {
         let trained = self.learned_from.iter().copied().filter_map(Container::new);
-        if self.own.is_none()
-            && let Some(method) =
-                crate::capacity::method_of(&self.path).filter(|method| method.learns())
-        {
-            return Some(format!(
-                "The table of {} is of {}, which learns: if its model was trained on containers of the training part, \
-                 its scores on them are too good. Those on the test parts are not affected.",
+        let methods = match self.own {
+            None => crate::capacity::methods_of(&self.path, Some(Subset::Training))?,
+            Some(_) => Vec::new(),
+        };
+        if let Some(method) = methods.into_iter().find(|method| method.learns()) {
+            return Ok(Some(format!(
+                "{} was made by `{}`, a trained method: if its model was trained on containers of the training \
+                 part, its scores on them are too good. Scores on the test parts are not affected.",
                 self.name,
                 method.name()
-            ));
+            )));
         }
         let trained: Vec<String> = trained
             .filter(|container| container.subset() == Subset::Training)
             .map(|container| format!("C{}", container.number()))
             .collect();
-        (!trained.is_empty()).then(|| {
+        Ok((!trained.is_empty()).then(|| {
             format!(
-                "The model of {} was trained on {}: its scores on them are too good. Those on the \
+                "The model of {} was trained on {}: its scores on them are too good. Scores on the \
                  test parts are not affected.",
                 self.name,
                 trained.join(", ")
             )
-        })
+        }))
     }
 }
 
@@ -166,8 +167,9 @@ pub fn run(
     for nowhere in given.filter(|a| !a.is_any()) {
         progress(&format!("warning: {}: has no recording of this data set", nowhere.name));
     }
+    let cautions = options.capacities.iter().map(CapacityTable::caution);
     let mut cautions: Vec<String> =
-        options.capacities.iter().filter_map(CapacityTable::caution).collect();
+        cautions.filter_map(Result::transpose).collect::<Result<_>>()?;
     cautions.iter().for_each(|caution| progress(caution));
     if let Some(without) = without_tables(&set.recordings, options.detections.as_deref()) {
         progress(&format!("warning: {without}"));
@@ -311,7 +313,7 @@ fn baselines(
         Ok(())
     };
     let setting = |matrices| Setting { rows, matrices, seed, stop, finish: &finish };
-    // The widest tables take longest: what is short fills the gaps behind them.
+    // The widest tables take longest: what is short fills the gaps after them.
     let units: Vec<(Setting<'_>, Unit)> = sets
         .iter()
         .zip(&matrices)
@@ -338,13 +340,25 @@ mod tests {
     #[test]
     fn a_table_of_a_method_that_learns_is_doubted() {
         let file = tempfile::NamedTempFile::new().unwrap();
-        let caution = |method: &str, own: Option<&'static str>| {
-            let text = format!("fileName,capacity[mL],method\nid1_0001.png,300,{method}\n");
+        let caution = |rows: &str, own: Option<&'static str>| {
+            let text = format!("fileName,capacity[mL],method,part\n{rows}\n");
             std::fs::write(file.path(), text).unwrap();
             let (name, path) = ("E".into(), file.path().into());
-            CapacityTable { name, path, own, learned_from: Vec::new() }.caution()
+            CapacityTable { name, path, own, learned_from: Vec::new() }.caution().unwrap()
         };
-        assert!(caution("fused", None).unwrap().contains("is of fused, which learns"));
-        assert_eq!((caution("m5", None), caution("fused", Some("rgb1"))), (None, None));
+        let training = "id1_0001.png,300,fused,";
+        assert!(caution(training, None).unwrap().contains("E was made by `fused`, a trained"));
+        for (rows, own) in [
+            ("id1_0001.png,300,m5,", None),
+            (training, Some("rgb1")),
+            ("id10_0001.png,300,fused,", None),
+            ("id000001.png,300,fused,public test", None),
+        ] {
+            assert_eq!(caution(rows, own), None, "{rows}");
+        }
+        // Whichever row says so.
+        let later = format!("id10_0001.png,300,m5,\n{}", training.replace("fused", "m5+fused"));
+        assert!(caution(&later, None).is_some());
+        assert!(caution("id000001.png,300,fused,", None).is_some());
     }
 }

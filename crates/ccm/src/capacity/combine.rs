@@ -13,7 +13,8 @@ use crate::predictions::Named;
 use crate::submission::RowKey;
 
 /// Writes the mean of the files' estimates of each recording, `prior` where none has one; what has the
-/// status `prior`, equals M5's prior, or is -1, is not an estimate. Returns the recordings and how many have the prior.
+/// status `prior`, equals M5's prior or `prior`, or is -1, is not an estimate. Returns the recordings and how many
+/// have the prior.
 ///
 /// # Errors
 /// [`CcmError`] for unreadable files, recordings that a file lacks, a prior that is no capacity, and an output that
@@ -25,12 +26,16 @@ pub fn combine_files(inputs: &[PathBuf], prior: f64, out: &Path) -> Result<(usiz
         )));
     }
     let mut estimates: BTreeMap<Named, Vec<f64>> = BTreeMap::new();
-    let mut tables = Vec::with_capacity(inputs.len());
+    let (mut tables, mut methods) = (Vec::with_capacity(inputs.len()), Vec::new());
     for path in inputs {
-        let table = table::read(path)?;
+        let table = table::read_measured(path)?;
         for (&key, measured) in &table {
-            let known = measured.capacity_ml.filter(|&v| !measured.is_prior && v != prior);
-            estimates.entry(key).or_default().extend(known);
+            estimates.entry(key).or_default().extend(measured.filter(|&ml| ml != prior));
+        }
+        for method in table::methods_of(path, None)? {
+            if !methods.contains(&method.name()) {
+                methods.push(method.name());
+            }
         }
         tables.push((path, table));
     }
@@ -45,10 +50,12 @@ pub fn combine_files(inputs: &[PathBuf], prior: f64, out: &Path) -> Result<(usiz
             });
         }
     }
-    // M5's columns and what became of a recording; the part where ids would be of several.
+    // M5's columns, what became of a recording and by which methods; and the part of an id, which is one of
+    // every part.
     let by_part = |named: &Named| matches!(named.key, RowKey::Id(_)) && named.part.is_some();
     let several = estimates.keys().any(by_part);
-    let mut text = String::from("fileName,capacity[mL],status");
+    let mut text = String::from("fileName,capacity[mL],status,method");
+    let methods = methods.join(table::AND);
     text += if several { ",part\n" } else { "\n" };
     let mut without = 0;
     for (named, values) in &estimates {
@@ -58,7 +65,7 @@ pub fn combine_files(inputs: &[PathBuf], prior: f64, out: &Path) -> Result<(usiz
         } else {
             (values.iter().sum::<f64>() / values.len() as f64, "ok")
         };
-        let _ = write!(text, "{},{value},{status}", file_name(named.key));
+        let _ = write!(text, "{},{value},{status},{methods}", file_name(named.key));
         if several {
             let _ = write!(text, ",{}", named.part.map_or("", Subset::name));
         }

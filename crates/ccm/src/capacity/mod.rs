@@ -37,7 +37,7 @@ pub use model::{CapacityModel, HeldOut};
 pub use options::{CapacityOptions, Method};
 pub use problem::Problem;
 pub use regions::{LabelledRegion, Regions, regions};
-pub(crate) use table::method_of;
+pub(crate) use table::methods_of;
 pub use table::{Measured, PRIOR_MASS_G, Row, read, write};
 pub use views::Views;
 

@@ -142,7 +142,7 @@ pub fn read(path: &Path) -> Result<HashMap<Named, Measured>> {
     } else {
         None
     };
-    let (file, status) = (table.column("fileName")?, table.find("status"));
+    let file = table.column("fileName")?;
     let mut measured = HashMap::with_capacity(capacities.len());
     for row in 0..table.rows() {
         let named = row_name(&table, row, file)?;
@@ -160,19 +160,56 @@ pub fn read(path: &Path) -> Result<HashMap<Named, Measured>> {
             }
             _ => None,
         };
-        let says_prior = status.is_some_and(|status| table.text(row, status) == "prior");
-        let is_prior = capacity_ml.is_some() && (says_prior || capacity_ml == Some(PRIOR_ML));
+        let is_prior = is_prior(&table, row, capacity_ml);
         let execution_ms = cell(3)?;
         measured.insert(named, Measured { capacity_ml, is_prior, dimensions, execution_ms });
     }
     Ok(measured)
 }
 
-/// The method that made a table of [`write()`]; `None` for another one.
-pub(crate) fn method_of(path: &Path) -> Option<Method> {
-    let table = Table::read(path).ok()?;
-    let column = table.find("method").filter(|_| table.rows() > 0)?;
-    Method::ALL.into_iter().find(|method| method.name() == table.text(0, column))
+/// Whether a capacity stands for a measurement.
+fn is_prior(table: &Table, row: usize, capacity_ml: Option<f64>) -> bool {
+    let says_so = table.find("status").is_some_and(|status| table.text(row, status) == "prior");
+    capacity_ml.is_some() && (says_so || capacity_ml == Some(PRIOR_ML))
+}
+
+/// Reads the measured capacities of such a table; `None` for a recording without. Other columns are not read.
+///
+/// # Errors
+/// As [`read_capacities`].
+pub(super) fn read_measured(path: &Path) -> Result<HashMap<Named, Option<f64>>> {
+    let mut capacities = read_capacities(path)?;
+    let table = Table::read(path)?;
+    let file = table.column("fileName")?;
+    for row in 0..table.rows() {
+        if let Some(capacity) = capacities.get_mut(&row_name(&table, row, file)?) {
+            *capacity = capacity.filter(|&ml| !is_prior(&table, row, Some(ml)));
+        }
+    }
+    Ok(capacities)
+}
+
+/// Between the methods of a combined table.
+pub(super) const AND: &str = "+";
+
+/// The methods that made a table of [`write()`], or of several such combined, as far as it says; of those
+/// recordings only that are of this part, or may be, if one is given.
+pub(crate) fn methods_of(path: &Path, part: Option<Subset>) -> Result<Vec<Method>> {
+    let table = Table::read(path)?;
+    let Some(column) = table.find("method") else { return Ok(Vec::new()) };
+    let file = table.column("fileName")?;
+    let mut found = Vec::new();
+    for row in 0..table.rows() {
+        let own = row_name(&table, row, file)?.part;
+        if own.zip(part).is_some_and(|(own, part)| own != part) {
+            continue;
+        }
+        for name in table.text(row, column).split(AND) {
+            let method = Method::ALL.into_iter().find(|method| method.name() == name);
+            found.extend(method.filter(|method| !found.contains(method)));
+        }
+    }
+    Ok(found)
 }
 
 /// Writes the table of what [`run`](super::run) made by these options; the file appears only when complete.

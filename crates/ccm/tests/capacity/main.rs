@@ -329,6 +329,15 @@ fn ids_of_several_parts_stay_apart() {
     let rows = "id1_0001.png,500,prior\nid1_0002.png,300,ok\nid1_0003.png,734.94,ok\n";
     std::fs::write(&one, format!("fileName,capacity[mL],status\n{rows}")).unwrap();
     assert_eq!(capacity::combine_files(&[one], 400.0, &two).unwrap(), (3, 2));
+    // Columns that are not used hold anything.
+    let lengths = dir.path().join("lengths.csv");
+    let header = "width top[mm],width bottom[mm],height[mm],execution[ms],method";
+    let row = "id1_0001.png,500,n/a,n/a,n/a,,m5+fused";
+    std::fs::write(&lengths, format!("fileName,capacity[mL],{header}\n{row}\n")).unwrap();
+    let four = dir.path().join("four.csv");
+    assert_eq!(capacity::combine_files(&[lengths], 400.0, &four).unwrap(), (1, 0));
+    let text = std::fs::read_to_string(&four).unwrap();
+    assert!(text.ends_with("\nid1_0001.png,500,ok,m5+fused\n"), "{text}");
     let of = |sequence: u16| Named::alone(RowKey::Sequence(1, sequence));
     let read = capacity::read(&two).unwrap();
     let priors = [1, 2, 3].map(|sequence| read[&of(sequence)].is_prior);

@@ -130,7 +130,7 @@ fn cross_validate(args: &Args) -> Result<ExitCode, Failure> {
     let others = others.collect::<Result<Vec<_>, Failure>>()?;
     if args.seeds > 1 && !is_seeded {
         eprintln!(
-            "warning: --seeds {}: neither the folds nor the classifier take the seed, so all runs are the same",
+            "warning: --seeds {}: neither the folds nor the classifier use the seed, so all runs are the same",
             args.seeds
         );
     }

@@ -55,7 +55,7 @@ pub(super) fn detect(pair: &Pair, noise: f64) -> Option<(Cause, Array3<f64>)> {
     Some((Cause { evidence, ..cause }, found.apply(&pair.a)))
 }
 
-/// Six digits behind the point, or behind the first one where there would be too few.
+/// Six digits after the point, or after the first one where there would be too few.
 fn number(value: f64) -> String {
     if (1e-3..1e6).contains(&value.abs()) { format!("{value:.6}") } else { format!("{value:.6e}") }
 }

@@ -176,7 +176,7 @@ impl M4Plan {
 }
 
 /// 16-bit counts of interleaved samples from `frame` on, each less a share of the one before in its
-/// channel; zeros behind the last.
+/// channel; zeros after the last.
 fn pre_emphasised(samples: &[f32], channels: usize, frame: usize, out: &mut [f64]) {
     let count = |x: f32| f64::from(x) * 32768.0;
     let from = (frame * channels).min(samples.len());

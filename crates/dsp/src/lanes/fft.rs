@@ -214,7 +214,7 @@ impl<R: Lanes> Output<R> for Complex<'_, R> {
     }
 }
 
-/// Everything behind the first pass.
+/// Everything after the first pass.
 struct Quarters<'a, O, R: Lanes> {
     plan: &'a LaneFft<R>,
     work: &'a mut [R],

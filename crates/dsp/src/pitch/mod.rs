@@ -192,7 +192,7 @@ impl<T: Real> TuningEstimator<T> {
         Self { tracker, pitches: Vec::new(), magnitudes: Vec::new() }
     }
 
-    /// The tracker behind it.
+    /// The tracker after it.
     pub fn tracker(&self) -> &PitchTracker {
         &self.tracker
     }

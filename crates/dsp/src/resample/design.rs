@@ -220,7 +220,7 @@ fn factors(ratio: f64) -> Factors {
     }
 }
 
-/// The interpolator behind the filters; `pass`, `stop` are the band edges that they leave.
+/// The interpolator after the filters; `pass`, `stop` are the band edges that they leave.
 fn interpolator(f: &Factors, pass: f64, stop: f64, attenuation: f64) -> PolyDesign {
     let rise = if f.upsample { 1.0 } else { f.arb_down / f.arb_up as f64 };
     let protected = f.upsample || f.pre_down == 0;

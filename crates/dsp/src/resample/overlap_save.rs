@@ -101,7 +101,7 @@ impl OverlapSave {
         Self::followed(taps, change, After::Kept(kept), grain)
     }
 
-    /// [`new`](Self::new) with an interpolator behind the filter; `None` also where its places do not repeat.
+    /// [`new`](Self::new) with an interpolator after the filter; `None` also where its places do not repeat.
     pub fn interpolating(
         taps: &[f64],
         rates: (usize, usize),

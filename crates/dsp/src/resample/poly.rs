@@ -22,7 +22,7 @@ pub(super) struct Poly {
     unit: u64,
     /// Positions per tabulated phase.
     grain: u64,
-    /// Taps with the zeros behind them that fill blocks.
+    /// Taps with the zeros after them that fill blocks.
     width: usize,
     /// `[phase][order + 1][width]`: coefficients of the polynomial in the rest of the position.
     table: Vec<f32>,
@@ -155,7 +155,7 @@ impl WithSimd for Interpolate<'_> {
         let Poly { taps, order, step, unit, grain, width, .. } = *poly;
         let (mut frame, mut rest) = poly.position(first);
         let reach = (taps / 2) as i64 + 1 - taps as i64;
-        // Channel by channel, with zeros behind that meet those of the last taps.
+        // Channel by channel, with zeros after that meet those of the last taps.
         let room = input.data.len() / channels + width - taps;
         let mut planar = vec![0.0; room * channels];
         for (c, samples) in planar.chunks_exact_mut(room).enumerate() {

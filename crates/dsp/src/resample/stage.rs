@@ -15,7 +15,7 @@ use super::strided::strided;
 pub(super) enum Stage {
     /// Rational rate change.
     Fir(Fir),
-    /// A long filter, perhaps with the interpolator behind it.
+    /// A long filter, perhaps with the interpolator after it.
     Long(OverlapSave),
     /// Tabulated interpolator.
     Poly(Poly),

@@ -14,7 +14,7 @@ use super::watch::{Seen, Watch};
 pub enum Reader {
     /// For one stretch.
     Once(Box<dyn BlockSource>),
-    /// For this stretch, and those behind it.
+    /// For this stretch, and those after it.
     Again(Replay),
 }
 

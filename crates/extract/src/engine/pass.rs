@@ -228,7 +228,7 @@ impl Pass {
         self.branches.iter_mut().for_each(|branch| branch.hold(reached));
     }
 
-    /// What remains behind the last frame for each plan, where the recording `ended` or the stretch did; `None`
+    /// What remains after the last frame for each plan, where the recording `ended` or the stretch did; `None`
     /// when the run was stopped. What is much before that goes to `each`.
     ///
     /// # Errors

@@ -19,7 +19,7 @@ use crate::config::SignalConfig;
 use crate::inputs::stored::Purpose;
 use crate::inputs::{Input, InputSource};
 
-/// The repair of a stretch whose end is behind that of its recording.
+/// The repair of a stretch whose end is after that of its recording.
 const END_BEYOND: &str = "end_beyond_recording";
 /// Frames of a recording that is not cut.
 const UNCUT: u64 = 1 << 21;
@@ -150,7 +150,7 @@ pub fn check_stretch(
 ) -> Result<(), Failed> {
     let Some(rate) = outcome.sample_rate else { return Ok(()) };
     let crop = crop(signal, (input.start, input.end), rate);
-    // A start beyond all frames is behind the end.
+    // A start beyond all frames is after the end.
     if crop.is_empty() && crop.start < u64::MAX {
         let start = frame_at(input.start.unwrap_or(0.0), rate);
         let has_frames = input.end.is_none_or(|end| frame_at(end, rate) > start);

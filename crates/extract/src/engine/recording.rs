@@ -65,7 +65,7 @@ impl Recording {
     /// # Errors
     /// The temporary file cannot be written.
     pub fn add(&mut self, span: Span) -> io::Result<()> {
-        // The first span that sees the end knows where it is; one behind it may still have frames
+        // The first span that sees the end knows where it is; one after it may still have frames
         // whose samples the first had as context.
         self.total = self.total.or(span.total);
         for (i, values) in span.raw.into_iter().enumerate() {

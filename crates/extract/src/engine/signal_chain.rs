@@ -179,7 +179,7 @@ impl SignalChain {
         }
     }
 
-    /// Cuts the frames behind `from` to the configured length.
+    /// Cuts the frames after `from` to the configured length.
     fn cut(&mut self, out: &mut Vec<f32>, from: usize) {
         if let Some(remaining) = &mut self.remaining {
             let given = ((out.len() - from) / self.channels) as u64;

@@ -37,7 +37,7 @@ impl Derived for DeltaParams {
     }
 }
 
-/// Frames that a window still reaches, and those that wait for frames behind them.
+/// Frames that a window still reaches, and those that wait for frames after them.
 struct Slope<'p> {
     params: &'p DeltaParams,
     series: usize,

@@ -11,7 +11,7 @@ pub trait Derived: Send + Sync {
         source.to_vec()
     }
 
-    /// Whether every frame depends on all frames before it, ever less, as behind a recursive filter.
+    /// Whether every frame depends on all frames before it, ever less, as after a recursive filter.
     fn is_recursive(&self) -> bool {
         false
     }

@@ -98,7 +98,7 @@ pub(super) fn contents(place: &Place, stop: &Arc<AtomicBool>) -> Result<Contents
     };
     let left = Rc::new(Cell::new(MOST_HEADERS));
     let mut archive = Archive::new(Headers { blocks, left: left.clone() });
-    // Archives that were put one behind the other.
+    // Archives that were put one after the other.
     archive.set_ignore_zeros(true);
     let mut found = Contents::default();
     let mut labels: Vec<beside::Labels> = Vec::new();

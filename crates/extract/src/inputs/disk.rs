@@ -10,7 +10,7 @@ use super::folder::{has_extension, is_apple_double, walk};
 use super::found::{Found, Naming};
 use super::input::InputSource;
 use super::member::Place;
-use super::search::{Search, no_audio};
+use super::search::Search;
 use super::stored::{self, is_stored};
 use super::{archive, braces, ids, objects, wildcard};
 use crate::manifest;
@@ -32,10 +32,10 @@ impl Search<'_> {
         let path = Path::new(name);
         match std::fs::metadata(path) {
             Ok(meta) if meta.is_dir() => {
-                let (mut files, before) = (Vec::new(), self.skipped.len());
+                let (mut files, before) = (Vec::new(), self.places());
                 walk(path, &mut files, (&mut self.skipped, &mut self.archives))?;
                 if files.is_empty() {
-                    return Err(no_audio(path, &self.skipped[before..]));
+                    return Err(self.nothing_at(path, before));
                 }
                 self.push_sorted(path, files);
                 Ok(())
@@ -140,7 +140,7 @@ impl Search<'_> {
     }
 
     fn find_glob(&mut self, pattern: &str) -> Result<(), InputError> {
-        let (mut files, before) = (Vec::new(), self.skipped.len());
+        let (mut files, before) = (Vec::new(), self.places());
         let (mut archives, paths): (Vec<_>, Vec<_>) = wildcard::expand(pattern)?
             .into_iter()
             .partition(|path| archive::is_archive(path) && path.is_file());
@@ -152,7 +152,7 @@ impl Search<'_> {
             walk(&path, &mut files, (&mut self.skipped, &mut self.archives))?;
         }
         if files.is_empty() && archives.is_empty() {
-            return Err(no_audio(Path::new(pattern), &self.skipped[before..]));
+            return Err(self.nothing_at(Path::new(pattern), before));
         }
         self.push_sorted(&wildcard::root(pattern), files);
         Ok(())

@@ -142,7 +142,7 @@ fn place(found: &Found) -> Option<&InputSource> {
     }
 }
 
-/// The stretch behind the id of a file that is there more than once.
+/// The stretch after the id of a file that is there more than once.
 fn times(found: &Found) -> Option<String> {
     match (&found.naming, found.start, found.end) {
         (Naming::Given(_), ..) | (_, None, None) => None,

@@ -12,7 +12,7 @@
 //! the parts. The root is the folder named, the part of a glob before its first wildcard, or the
 //! folder of a file named; the id of a recording in a tar begins with the name of the tar; paths in a manifest are taken as written. Where ids collide, all those
 //! that do keep their extension; where that does not help, they take the path as given on the
-//! command line. Of several stretches of one file, each has its times behind the id, as
+//! command line. Of several stretches of one file, each has its times after the id, as
 //! `x@0.5-1.0`. What still collides is refused. Ids from a manifest stand as they are. Ids that
 //! would begin with `__`, the prefix of an output's own arrays, get `./` in front.
 
@@ -43,14 +43,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use corsmal_files::quote::quoted;
 
-use search::{Search, no_audio, told};
+use search::{Search, archives_told, no_audio, told};
 
 pub use error::InputError;
 pub(crate) use identities::Identities;
 pub use input::{Input, InputSource, list_hash};
 pub use member::{Fault, Member, Place};
 pub use stored::{Object, is_stored, object, require_store, shown};
-pub use times::times_refusal;
+pub use times::{Given, times_refusal};
 
 /// What names stand for.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -86,16 +86,9 @@ impl Collected {
                 format!("{n} tars have no end mark and may be cut short: {first}, ...")
             }
         });
-        let archives = self.archives.first().map(|first| {
-            let (first, example) = (first.display(), "'FOLDER/*.tar'");
-            match self.archives.len() {
-                1 => format!("{first} is not read, because it lies in a folder: name it"),
-                n => format!("{n} tars in folders are not read, {first} for one: name them, such as {example}"),
-            }
-        });
         let told = told(&self.skipped).into_iter();
         let sentences: Vec<String> = told
-            .chain(archives)
+            .chain(archives_told(&self.archives))
             .chain(unended)
             .chain(self.unused_times())
             .chain(twice::told(&self.inputs))
@@ -140,7 +133,7 @@ pub fn collect_until<S: AsRef<OsStr>>(
     }
     // Where nothing but such files was named, the first of them says so.
     if let (true, Some(path)) = (found.is_empty(), skipped.first()) {
-        return Err(no_audio(path, &[]));
+        return Err(no_audio(path, &[], &[]));
     }
     let ids = ids::assign(&found)?;
     let mut columns: Vec<String> = Vec::new();

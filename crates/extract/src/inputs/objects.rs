@@ -16,7 +16,7 @@ use super::folder::has_extension;
 use super::found::{Found, Naming};
 use super::input::InputSource;
 use super::member::Place;
-use super::search::{Search, no_audio};
+use super::search::Search;
 use super::stored::{self, Object, object};
 use super::{braces, wildcard};
 use crate::manifest;
@@ -112,15 +112,15 @@ impl Search<'_> {
     /// Recordings at any depth below a folder.
     fn find_below(&mut self, folder: &Object) -> Result<(), InputError> {
         let root = stored::key(folder);
-        let (before, passed) = (self.found.len(), self.skipped.len());
+        let before = self.places();
         for object in self.listing(folder)? {
             let key = stored::key(&object);
             let relative = PathBuf::from(key.strip_prefix(root).unwrap_or(key));
             self.sort_in(object, relative);
         }
-        match self.found.len() > before {
+        match self.found.len() > before.0 {
             true => Ok(()),
-            false => Err(no_audio(Path::new(&folder.to_string()), &self.skipped[passed..])),
+            false => Err(self.nothing_at(Path::new(&folder.to_string()), before)),
         }
     }
 
@@ -146,7 +146,7 @@ impl Search<'_> {
             root => format!("{}/", root.display()),
         };
         let keys = wildcard::Keys::new(pattern)?;
-        let (before, passed) = (self.found.len(), self.skipped.len());
+        let before = self.places();
         let mut matched = Vec::new();
         for object in self.listing(&stored::with_key(named, &root))? {
             let key = stored::key(&object);
@@ -167,9 +167,9 @@ impl Search<'_> {
             search.sort_in(object.clone(), relative);
             Ok(())
         })?;
-        match self.found.len() > before {
+        match self.found.len() > before.0 {
             true => Ok(()),
-            false => Err(no_audio(Path::new(&named.to_string()), &self.skipped[passed..])),
+            false => Err(self.nothing_at(Path::new(&named.to_string()), before)),
         }
     }
 }

@@ -35,11 +35,21 @@ impl<'a> Search<'a> {
         self.unended.append(&mut other.unended);
     }
 
+    /// How much was found, skipped and passed over so far.
+    pub(super) fn places(&self) -> (usize, usize, usize) {
+        (self.found.len(), self.skipped.len(), self.archives.len())
+    }
+
+    /// That nothing at `path` is read, and what is there instead since `before`.
+    pub(super) fn nothing_at(&self, path: &Path, before: (usize, usize, usize)) -> InputError {
+        no_audio(path, &self.skipped[before.1..], &self.archives[before.2..])
+    }
+
     /// The recordings of an archive; their ids begin with its name.
     pub(super) fn find_archive(&mut self, path: &Path, place: &Place) -> Result<(), InputError> {
         let contents = archive::contents(place, self.stop)?;
         if contents.recordings.is_empty() {
-            return Err(no_audio(path, &contents.skipped));
+            return Err(no_audio(path, &contents.skipped, &[]));
         }
         let shard = PathBuf::from(path.file_stem().unwrap_or_default());
         for Entry { member, name, labels } in contents.recordings {
@@ -70,11 +80,26 @@ pub(super) fn told(skipped: &[PathBuf]) -> Option<String> {
     Some(format!("{files} not read from folders: {}{more}", names.join(", ")))
 }
 
+/// That tars in folders are not read.
+pub(super) fn archives_told(archives: &[PathBuf]) -> Option<String> {
+    let first = archives.iter().min()?.display();
+    Some(match archives.len() {
+        1 => {
+            format!("{first} lies in a folder, so it is not read: to read its recordings, name it")
+        }
+        n => format!(
+            "{n} tars lie in folders, so they are not read, such as {first}: to read their recordings, name them \
+             (quoted, 'FOLDER/*.tar')"
+        ),
+    })
+}
+
 /// That nothing at `path` is read, and what is there instead.
-pub(super) fn no_audio(path: &Path, skipped: &[PathBuf]) -> InputError {
+pub(super) fn no_audio(path: &Path, skipped: &[PathBuf], archives: &[PathBuf]) -> InputError {
     let extensions = corsmal_audio::EXTENSIONS.join(", ");
     let mut skipped = skipped.to_vec();
     skipped.sort_unstable();
-    let skipped = told(&skipped).map(|told| format!("; {told}")).unwrap_or_default();
+    let instead = told(&skipped).into_iter().chain(archives_told(archives));
+    let skipped = instead.map(|told| format!("; {told}")).collect();
     InputError::NoAudio { path: path.into(), extensions, skipped }
 }

@@ -53,7 +53,7 @@ pub(super) enum Next<'a> {
 pub(super) struct Lines<'a> {
     reader: BufReader<&'a File>,
     line: Vec<u8>,
-    /// Byte behind the last line that holds.
+    /// Byte after the last line that holds.
     pub end: u64,
     /// What the lines that hold come to.
     pub chain: Chain,

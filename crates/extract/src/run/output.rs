@@ -128,7 +128,7 @@ struct Partial {
 }
 
 impl Output {
-    /// Opens the output behind the records of an interrupted run, which are of the first of `inputs`, its shard of
+    /// Opens the output after the records of an interrupted run, which are of the first of `inputs`, its shard of
     /// `all`; it is to hold frames or a summary.
     pub fn new(
         ledger: Ledger,

@@ -43,7 +43,7 @@ pub struct Batch {
     pub outcomes: Vec<Outcome>,
     /// Names of the summary's columns; empty without a summary.
     pub names: Vec<String>,
-    /// Summary rows of the recordings that have features, one behind the other.
+    /// Summary rows of the recordings that have features, one after the other.
     pub values: Vec<f32>,
     /// Plan and frames of each recording; `None` with a summary, and where there are no features.
     pub frames: Vec<Option<(Arc<Plan>, Vec<FeatureArray>)>>,
@@ -176,7 +176,7 @@ impl Recordings {
         stop: &Arc<AtomicBool>,
         outcome: &mut Outcome,
     ) -> Result<Computed, Failed> {
-        // A piece ends before its stretch, and its reader tells nothing of what lies behind.
+        // A piece ends before its stretch, and its reader tells nothing of what lies after.
         let usable = piece.is_none().then_some(decoders);
         let opened = work::open(input, (watch, usable), (&self.plans, survey), stop, outcome)?;
         let planned = opened.planned.clone();

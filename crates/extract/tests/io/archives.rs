@@ -389,9 +389,11 @@ fn archives_in_folders_are_told() {
     let tar = archive(&folder, "s.tar", &[("a.wav", &wav(2))]);
     let found = collect(folder.path()).unwrap();
     assert_eq!(ids(&found.inputs), ["x"]);
-    assert!(found.warning().unwrap().contains("s.tar is not read, because it lies in a folder"));
+    assert!(found.warning().unwrap().contains("s.tar lies in a folder, so it is not read"));
     let respelt = folder.path().join(".").join("s.tar");
     let found = inputs::collect(&[text(folder.path()), text(&respelt)]).unwrap();
     assert_eq!((found.inputs.len(), found.warning()), (2, None));
     assert_eq!(collect(&tar).unwrap().warning(), None);
+    fs::remove_file(folder.path().join("x.wav")).unwrap();
+    assert!(collect(folder.path()).unwrap_err().contains("to read its recordings, name it"));
 }

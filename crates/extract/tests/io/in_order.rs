@@ -48,7 +48,7 @@ fn values(features: Option<Features>) -> Vec<f32> {
     }
 }
 
-/// What one call gives for all: outcomes, and values one behind the other.
+/// What one call gives for all: outcomes, and values one after the other.
 fn together(batch: Batch) -> (Vec<Outcome>, Vec<f32>) {
     let frames = batch.frames.into_iter().flatten();
     let frames = frames.flat_map(|(_, arrays)| values(Some(Features::Frames(arrays))));

@@ -174,7 +174,7 @@ fn times_of_events_are_refused_on_the_line_that_has_them() {
     let json = "{\"path\": \"a.wav\", \"onset\": 1}\n\n{\"path\": \"a.wav\", \"onset\": 1, \"offset\": 2}\n";
     for (name, lines, place) in [
         ("m.jsonl", json, "m.jsonl, line 3: columns"),
-        ("m.csv", "path,onset,offset\na.wav,1,2\n", "m.csv, line 1: columns"),
+        ("m.csv", "path,onset,offset\na.wav,1,2\n", "m.csv, line 2: columns"),
     ] {
         let why = refused(name, lines);
         assert!(why.contains(place) && why.contains("onset"), "{why}");

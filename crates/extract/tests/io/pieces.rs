@@ -48,7 +48,7 @@ fn compute(config: &str, input: &Input, pieces: &[Piece]) -> Batch {
     recordings.extract((&inputs, pieces), None, 2, &Arc::default()).unwrap()
 }
 
-/// The bits of every feature, pieces one behind the other.
+/// The bits of every feature, pieces one after the other.
 fn bits(batch: Batch) -> Vec<Vec<u32>> {
     let statuses: Vec<_> = batch.outcomes.iter().map(|o| (o.status, o.reason.clone())).collect();
     assert!(statuses.iter().all(|(status, _)| *status == Status::Ok), "{statuses:?}");

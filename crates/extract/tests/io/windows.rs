@@ -110,8 +110,8 @@ fn length(path: &Path) -> f64 {
 fn stretches_together_are_as_stretches_alone() {
     let folder = tempfile::tempdir().unwrap();
     let samples = Path::new("../audio/tests/audio/samples");
-    // In lengths of the recording: one behind the other, inside of others, backwards, one twice, over the end,
-    // behind it.
+    // In lengths of the recording: one after the other, inside of others, backwards, one twice, over the end,
+    // after it.
     let mut times: Vec<(f64, Option<f64>)> =
         (0..14).map(|i| (f64::from(i) * 0.07, Some(f64::from(i) * 0.07 + 0.15))).collect();
     times.extend([(0.3, Some(0.9)), (0.4, Some(0.6)), (0.1, Some(0.3)), (0.1, Some(0.3))]);
@@ -272,21 +272,27 @@ fn what_is_missing_of_recordings_has_no_windows_and_is_told() {
         into_windows(inputs, WindowSpan { window: 0.1, hop: 0.1 }, &Arc::default()).unwrap()
     };
     let until = |end: f64| Input { id: "y".into(), end: Some(end), ..input(&path) };
-    assert!(cut(vec![input(&path), until(0.5)]).warnings().is_empty());
+    // Times are rounded where they come from.
+    for end in [0.5, 1.0, 1.0004, 1.05] {
+        assert!(cut(vec![input(&path), until(end)]).warnings().is_empty());
+    }
     assert_eq!(
         cut(vec![until(3.0), input(&path)]).warnings(),
-        ["y: the stretch ends at 3 s, its recording at 1 s: what is missing has no windows"]
+        ["y: the stretch ends at 3 s, its recording at 1 s; what is missing has no windows"]
     );
     let whole = std::fs::read(&path).unwrap();
     std::fs::write(&path, &whole[..44 + 2 * 5000]).unwrap();
-    // What ends before the loss is complete.
+    // What ends before the loss is complete, and what was lost may be less than a window.
     assert!(cut(vec![until(0.5)]).warnings().is_empty());
+    let long = WindowSpan { window: 0.6, hop: 0.6 };
+    let windows = into_windows(vec![input(&path)], long, &Arc::default()).unwrap();
+    assert!(windows.inputs.len() == 1 && windows.warnings().is_empty());
     let windows = cut(vec![input(&path), Input { id: "y".into(), ..input(&path) }]);
     assert_eq!(windows.inputs.len(), 12);
     assert_eq!(
         windows.warnings(),
         [
-            "x: the file ends after 5000 of 8000 frames (the first of 2 such recordings): what is missing has no windows"
+            "x: the file ends after 5000 of 8000 frames, the first of 2 such inputs; what is missing has no windows"
         ]
     );
     // Counted by decoding.

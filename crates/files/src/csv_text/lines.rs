@@ -10,7 +10,7 @@ pub struct LineFeeds<R> {
     inner: R,
     /// A carriage return that ends a line was read and not given.
     has_return: bool,
-    /// Blanks that were read and not given: behind them, the field may end.
+    /// Blanks that were read and not given: after them, the field may end.
     blanks: Vec<u8>,
     /// Of these, those that are given now, since the field went on.
     given: usize,
@@ -28,7 +28,7 @@ pub(super) struct Lines {
     place: Place,
     /// The line on which quotation marks were last opened.
     opened: u64,
-    /// Empty lines that follow each other: the first, and the one behind the last.
+    /// Empty lines that follow each other: the first, and the one after the last.
     empty: Vec<[u64; 2]>,
 }
 
@@ -147,7 +147,7 @@ impl<R: BufRead> Read for LineFeeds<R> {
                 }
                 let begins = self.lines.place == Place::Begin;
                 if ends || byte == b'\n' || byte == self.lines.delimiter || begins {
-                    // The field ends before them, or begins behind them.
+                    // The field ends before them, or begins after them.
                     self.blanks.clear();
                 } else if let Some(&blank) = self.blanks.get(self.given) {
                     self.given += 1;

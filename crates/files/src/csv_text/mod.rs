@@ -73,7 +73,7 @@ fn unclosed<R: BufRead>(reader: &csv::Reader<LineFeeds<R>>) -> Option<Fault> {
     Some(Fault { line: Some(line), reason: reason.into() })
 }
 
-/// The records behind the header, each with the number of its line.
+/// The records after the header, each with the number of its line.
 pub fn records<R: BufRead>(
     reader: &mut csv::Reader<LineFeeds<R>>,
 ) -> impl Iterator<Item = Result<(u64, csv::StringRecord), Fault>> {
@@ -216,7 +216,7 @@ mod tests {
         assert!(fault.starts_with("line 3: a quotation mark opens here"), "{fault}");
     }
 
-    /// Records behind empty lines were said to stand on these.
+    /// Records after empty lines were said to stand on these.
     #[test]
     fn empty_lines_are_counted() {
         for ending in ["\n", "\r\n"] {

@@ -16,7 +16,7 @@ pub struct NpyFile {
 }
 
 impl NpyFile {
-    /// Reads the header of a file, and compares its shape with the bytes behind it.
+    /// Reads the header of a file, and compares its shape with the bytes after it.
     ///
     /// # Errors
     /// [`NpyError`].

@@ -52,7 +52,7 @@ impl Header {
             })
     }
 
-    /// Bytes of the data behind the header.
+    /// Bytes of the data after the header.
     ///
     /// # Errors
     /// As [`Header::elements`].

@@ -42,7 +42,7 @@ impl Header {
         let mut text = vec![0u8; length];
         read_exact(reader, &mut text, start)?;
         let header = literal::header(&text, start)?;
-        // Without bytes behind it, a length is no more than the header's word.
+        // Without bytes after it, a length is no more than the header's word.
         let axes = header.shape.iter().try_fold(1u64, |n, &axis| n.checked_mul(axis.max(1)));
         if header.data_len()? == 0 && axes.is_none_or(|n| n > MAX_EMPTY) {
             let (shape, itemsize) = (header.shape, header.dtype.itemsize);

@@ -13,7 +13,7 @@ pub enum Compression {
     Deflated,
 }
 
-/// A completed entry: all that is needed to continue the archive behind it and to list it in the
+/// A completed entry: all that is needed to continue the archive after it and to list it in the
 /// central directory.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct EntryRecord {
@@ -21,7 +21,7 @@ pub struct EntryRecord {
     pub name: String,
     /// Byte of its local header.
     pub offset: u64,
-    /// Byte behind its data.
+    /// Byte after its data.
     pub end: u64,
     /// CRC-32 of the member.
     pub crc32: u32,

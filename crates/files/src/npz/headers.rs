@@ -85,7 +85,7 @@ pub(super) fn local_header(entry: &EntryRecord, zip64: Zip64) -> Vec<u8> {
     out
 }
 
-/// Writes everything behind the last entry, which ends at byte `start`.
+/// Writes everything after the last entry, which ends at byte `start`.
 pub(super) fn write_directory(
     to: &mut impl Write,
     entries: &[EntryRecord],

@@ -1,7 +1,7 @@
 //! `.npz` archives: a streaming writer that can continue a partial file, and a reader for ours and
 //! anyone else's.
 //!
-//! The writer is our own because resuming an interrupted run means continuing a zip archive behind
+//! The writer is our own because resuming an interrupted run means continuing a zip archive after
 //! its last sound entry, before any central directory exists; no zip library offers that.
 
 mod disk;

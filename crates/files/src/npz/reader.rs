@@ -155,7 +155,7 @@ impl NpzFile {
             };
             let count = header.elements().map_err(|e| wrong.npy(e))?;
             let width = header.dtype.itemsize;
-            // Only with bytes behind them are width and count more than a header's word.
+            // Only with bytes after them are width and count more than a header's word.
             match (count, width) {
                 (0, _) => return Ok(Vec::new()),
                 (_, 0) => return Err(wrong.kind("text of at least one character", header)),

@@ -43,7 +43,7 @@ impl NpzWriter {
         Ok(Self::over(file, path, compression, Vec::new()))
     }
 
-    /// Continues a partial archive, open as `file`, behind `entries`, cutting off whatever follows
+    /// Continues a partial archive, open as `file`, after `entries`, cutting off whatever follows
     /// them; errors call it `path`.
     ///
     /// Give entries that [`super::intact_entries`] found intact.
@@ -72,7 +72,7 @@ impl NpzWriter {
         Ok(writer)
     }
 
-    /// Continues an archive behind `entries` in an open file; errors call it `path`.
+    /// Continues an archive after `entries` in an open file; errors call it `path`.
     pub fn over(
         file: File,
         path: &Path,
@@ -354,7 +354,7 @@ impl NpzWriter {
         Ok(())
     }
 
-    /// Drops everything behind the last complete entry.
+    /// Drops everything after the last complete entry.
     fn cut(&mut self) -> io::Result<()> {
         self.file.set_len(self.end)?;
         self.file.seek(SeekFrom::Start(self.end))?;

@@ -1,7 +1,7 @@
 //! Types of the fields of Parquet's metadata, as `parquet.thrift` of the Apache format has them.
 //!
 //! The parquet crate reads a known field as this type, whatever type its header declares. One that declares
-//! another would make the crate read the bytes behind it as something else than the walk does.
+//! another would make the crate read the bytes after it as something else than the walk does.
 
 /// What a field holds.
 #[derive(Clone, Copy, Debug)]

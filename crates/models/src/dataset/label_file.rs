@@ -134,7 +134,9 @@ impl LabelFile {
     /// A recording that is not named by a whole number, if there is one: the first by its name.
     pub(super) fn other_than_numbers(&self) -> Option<&str> {
         let names = self.rows.keys().map(String::as_str);
-        names.filter(|name| name.parse::<u64>().is_err()).min()
+        // pandas writes whole numbers beside empty cells as 7.0.
+        let is_number = |name: &str| name.parse::<f64>().is_ok_and(|number| number.fract() == 0.0);
+        names.filter(|name| !is_number(name)).min()
     }
 
     /// Label columns in the order of these recordings, given as (id, path), of which each must have

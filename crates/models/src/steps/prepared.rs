@@ -1,4 +1,4 @@
-//! Training rows behind steps that were fitted on them.
+//! Training rows after steps that were fitted on them.
 
 use ndarray::{ArcArray2, Array2, ArrayView2, CowArray, Ix2};
 
@@ -18,7 +18,7 @@ pub fn through<'a>(steps: &[Step], x: ArrayView2<'a, f64>) -> Result<CowArray<'a
     Ok(current)
 }
 
-/// Fitted steps with the training rows behind them: made once, for every classifier that follows.
+/// Fitted steps with the training rows after them: made once, for every classifier that follows.
 #[derive(Clone, Debug)]
 pub struct Prepared<'a> {
     steps: Vec<Step>,
@@ -56,7 +56,7 @@ impl<'a> Prepared<'a> {
         &self.steps
     }
 
-    /// A classifier of the training rows behind the steps.
+    /// A classifier of the training rows after the steps.
     ///
     /// # Errors
     /// As [`ClassifierSpec::train`].

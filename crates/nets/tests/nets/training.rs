@@ -305,7 +305,7 @@ fn numbers_that_are_not_finite_end_the_training_or_the_prediction() {
     let error = probabilities(&network, &items, &rows, &recipe).unwrap_err();
     assert!(matches!(error, NetError::Output { item: 1, .. }), "{error}");
 
-    // Large inputs: the loss is as always behind a normalisation, whose running variance is not.
+    // Large inputs: the loss is as always after a normalisation, whose running variance is not.
     let definition = networks::named("m4_type").unwrap();
     let mut network = definition.build(None, 0).unwrap();
     let before: Vec<f32> = network.parameters().iter().flat_map(|(_, v)| v.to_vec()).collect();

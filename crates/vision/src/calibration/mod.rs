@@ -173,7 +173,7 @@ impl Camera {
         numbers(self).into_iter().zip(numbers(other)).all(near)
     }
 
-    /// Distance of a point along the camera's axis in m; below 0 behind the camera.
+    /// Distance of a point along the camera's axis in m; below 0 after the camera.
     pub(crate) fn depth(&self, point: [f64; 3]) -> f64 {
         matrix::times(&self.rotation, point)[2] + self.translation[2]
     }

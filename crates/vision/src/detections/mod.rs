@@ -113,7 +113,7 @@ fn beside(table: &Path, file: &str) -> PathBuf {
     table.parent().unwrap_or(Path::new("")).join(file)
 }
 
-/// A whole number without what pandas may write behind it: also 8.0.
+/// A whole number without what pandas may write after it: also 8.0.
 fn whole(number: &str) -> &str {
     number.strip_suffix(".0").unwrap_or(number)
 }
@@ -224,7 +224,7 @@ mod tests {
             let error = table("d.csv", &format!("{HEADER}{row}\n")).unwrap_err().to_string();
             assert!(error.contains(part), "{error}");
         }
-        // As Excel ends lines and separates columns, and behind an empty one.
+        // As Excel ends lines and separates columns, and after an empty one.
         let rows = format!("{HEADER}1,1,cup,1,0,0,1,1,m.png\n\n1,5,cup,1,0,0,1,1,\n");
         for (ending, comma) in [("\n", ","), ("\r\n", ";"), ("\r", "\t")] {
             let rows = rows.replace(',', comma).replace('\n', ending);

@@ -7,7 +7,7 @@ use super::mp4::Declared;
 
 /// The matrix that says nothing.
 const UNSPECIFIED: u16 = 2;
-/// Bits behind the point.
+/// Bits after the point.
 const POINT: i32 = 16;
 
 /// What is known of a video's colours.
@@ -85,7 +85,7 @@ impl Colours {
     }
 }
 
-/// Factors with [`POINT`] bits behind the point.
+/// Factors with [`POINT`] bits after the point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Conversion {
     floor: i32,

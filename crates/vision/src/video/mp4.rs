@@ -278,7 +278,7 @@ fn colours(description: &[u8]) -> Declared {
     Declared { matrix: matrix.map(|two| u16::from_be_bytes(*two)), full }
 }
 
-/// The entries of a table of `width` bytes each, behind version, flags and their number.
+/// The entries of a table of `width` bytes each, after version, flags and their number.
 fn entries(table: &[u8], width: usize) -> Result<std::slice::ChunksExact<'_, u8>, String> {
     let count = u32_at(table, 4)? as usize;
     let bytes = count.checked_mul(width).and_then(|bytes| table.get(8..)?.get(..bytes));

@@ -160,7 +160,7 @@ fn what_is_lost_is_silence() {
     assert_eq!((got.samples.len(), got.report.repairs), (2 * FRAMES, vec![lost]));
     assert!(got.samples[..2 * 4 * FRAME] == samples_of(FRAME..5 * FRAME));
     assert!(got.samples[2 * 4 * FRAME..2 * 5 * FRAME].iter().all(|y| *y == 0.0));
-    // From the second packet behind it on, nothing shows.
+    // From the second packet after it on, nothing shows.
     assert!(got.samples[2 * 6 * FRAME..] == samples_of(7 * FRAME..FRAME + FRAMES));
     // A gap in the time of the packets.
     let times = vec![(4, 1024), (1, 3 * 1024), (5, 1024), (1, 65)];
@@ -185,7 +185,7 @@ fn cut_files_give_what_is_there() {
     assert!(refusal(&behind[..1500]).contains("a recorder writes last"));
     assert!(refusal(&bytes[..200]).contains("a whole index"));
     assert!(refusal(&bytes[..24]).contains("without an index"));
-    // Offsets far behind the end.
+    // Offsets far after the end.
     let mut movie = Movie { chunk: 1, has_long_offsets: true, ..Movie::new() };
     movie.packets.truncate(1);
     let mut bytes = movie.bytes();

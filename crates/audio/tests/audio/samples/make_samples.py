@@ -57,7 +57,7 @@ with tempfile.TemporaryDirectory() as folder:
             opus = ["-c:a", "libopus", "-mapping_family", "255", "-b:a", "128k"]
             run(*source, *opus, HERE / "levels-8ch.opus")
 
-    # AAC in ADTS, in MP4 (index behind) and in fragments: 10 packets and 65 samples behind the
+    # AAC in ADTS, in MP4 (index at the end) and in fragments: 10 packets and 65 samples after the
     # encoder's delay of 1024; no noise that a decoder makes up. ALAC: a packet of 4096 and the rest.
     soundfile.write(folder / "sines.wav", sines[:9281], 44100)
     aac = ["ffmpeg", "-y", "-i", folder / "sines.wav", "-bitexact"]

@@ -20,7 +20,9 @@ Example, M5's combination of its two frames:
 
 The estimate of a recording is the mean of its estimates in the files, or the prior if no
 file has one. An estimate equal to the prior, or to the published one of 734.94 mL, counts as none,
-as in the published program.")]
+as in the published program; so does a row with the status prior. The table written has the columns
+fileName, capacity[mL], status (ok, prior, none), method (those of the files) and, for ids of the flat
+release, part.")]
 pub struct Args {
     /// Tables with the columns fileName and `capacity[mL]`.
     #[arg(long = "in", value_name = "CSV", num_args = 1.., required = true)]

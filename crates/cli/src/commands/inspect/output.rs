@@ -26,7 +26,7 @@ use crate::progress::{counts, failure_line};
 
 /// Members shown as text; JSON has all.
 const SHOWN: usize = 20;
-/// Where values begin behind `  label       `.
+/// Where values begin after `  label       `.
 const LABELS: usize = 14;
 
 /// Everything that is printed; its JSON form is the output of `--json`.

@@ -135,7 +135,7 @@ fn strict_and_max_errors_stop_early_and_can_be_continued() {
         let run = extract(&audio, &out, &[NOT_CENTERED, stop].concat()).with(2);
         let allowed = if stop[0] == "--strict" { "(0 allowed)" } else { "(2 allowed)" };
         assert!(run.stderr.contains(allowed) && run.stderr.contains("--resume"), "{}", run.stderr);
-        // Nothing is written behind the one that was too many.
+        // Nothing is written after the one that was too many.
         let failed = if stop[0] == "--strict" { "after 1 failed" } else { "after 3 failed" };
         assert!(run.stderr.contains(failed), "{}", run.stderr);
         assert!(!out.exists());

@@ -47,7 +47,7 @@ fn long_recordings() {
         assert!(std::fs::read(&out).unwrap() == std::fs::read(&one).unwrap(), "--jobs {jobs}");
     }
 
-    // Cut off behind the first span: the header promises two more.
+    // Cut off after the first span: the header promises two more.
     let kept = (1 << 20) + 1000;
     let bytes = std::fs::read(&long).unwrap();
     std::fs::write(at("cut.wav"), &bytes[..44 + 2 * kept]).unwrap();

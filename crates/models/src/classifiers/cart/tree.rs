@@ -152,7 +152,7 @@ impl Tree {
                 if node.feature == LEAF {
                     next < leaves
                 } else {
-                    // Children lie behind their parent: no walk can go round.
+                    // Children lie after their parent: no walk can go round.
                     (node.feature as usize) < n_features && next > i && next + 1 < self.nodes.len()
                 }
             });

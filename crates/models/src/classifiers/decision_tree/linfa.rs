@@ -67,7 +67,7 @@ enum Node {
 pub struct LinfaTree {
     n_features: usize,
     n_classes: usize,
-    /// parents before children, left children directly behind their parent
+    /// parents before children, left children directly after their parent
     nodes: Vec<Node>,
 }
 
@@ -187,7 +187,7 @@ impl Classify for LinfaTree {
         let n = self.nodes.len();
         let node_is_sound = |(at, node): (usize, &Node)| match *node {
             Node::Leaf { class } => class < self.n_classes,
-            // Children lie behind their parent: no walk can go round.
+            // Children lie after their parent: no walk can go round.
             Node::Split { feature, threshold, right } => {
                 let behind = at + 1 < n && at < right && right < n;
                 feature < self.n_features && !threshold.is_nan() && behind
