@@ -47,11 +47,11 @@ def rows_of(batch: Any) -> list[Any]:
         return values
 
     paths, contents = column(PATH, pa.string()), column(BYTES, pa.large_binary())
+    # Without an archive, these are labels.
+    places = zip(PLACE, (pa.string(), pa.uint64(), pa.uint64(), pa.string()), strict=True)
     archives, offsets, sizes, faults = (
-        column(name, kind)
-        for name, kind in zip(
-            PLACE, (pa.string(), pa.uint64(), pa.uint64(), pa.string()), strict=True
-        )
+        column(name, kind) if PLACE[0] in names else [None] * batch.num_rows
+        for name, kind in places
     )
     ids = column(ID, pa.string())
     starts, ends = column(START, pa.float64()), column(END, pa.float64())

@@ -221,6 +221,7 @@ fn options_of_other_methods_are_refused() {
         (["fused", "--outliers", "kept"], "--outliers is for m4; --method is fused"),
         (["fused", "--variant", "published"], "--variant is for m2, m4 and m5; --method is fused"),
         (["m3", "--variant", "corrected"], "--variant is for m2, m4 and m5; --method is m3"),
+        (["m2", "--detections", "d"], "--detections is for m3, m4, m5 and fused; --method is m2"),
         (["m5", "--seed", "2"], "--seed is for m3, m4 and fused; --method is m5"),
     ] {
         let found = refused(&[&of[..], &words].concat());

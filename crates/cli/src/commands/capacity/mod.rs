@@ -155,6 +155,9 @@ fn estimate(args: Estimate) -> Result<ExitCode, Failure> {
     if args.source.seed.is_some() && matches!(method, Method::M2 | Method::M5) {
         return Err(unused("--seed", "m3, m4 and fused", method));
     }
+    if args.source.detections.is_some() && method == Method::M2 {
+        return Err(unused("--detections", "m3, m4, m5 and fused", method));
+    }
     let mut options = args.source.options(method, args.variant.unwrap_or(VariantName::Corrected));
     if let Some(outliers) = args.outliers {
         options.outliers = match outliers {

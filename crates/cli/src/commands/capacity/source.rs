@@ -21,7 +21,7 @@ pub(super) struct Source {
     /// Folder of tables of detections (SEQUENCE.csv or .json, by container or not); by default
     /// `detections/` next to each recording's audio folder.
     #[arg(long, value_name = "DIR")]
-    detections: Option<PathBuf>,
+    pub(super) detections: Option<PathBuf>,
     /// Seed of votes (m3, fused), isolation forests (m4, fused) and the training of m2's network
     /// [default: 1]
     #[arg(long)]

@@ -17,6 +17,9 @@ pub fn run(args: Args) -> Result<ExitCode, Failure> {
     publish::check(&args.out, args.overwrite)?;
     let learns_by_steps = !args.parameters.is_empty() || args.checkpoints.is_some();
     let method = match args.method {
+        Learning::M2 if args.source.detections.is_some() => {
+            return Err(super::unused("--detections", "m3 and fused", Method::M2));
+        }
         Learning::M2 => return network(args),
         _ if learns_by_steps => {
             return Err(Failure::new(

@@ -69,6 +69,10 @@ fn what_is_there_stays_unless_it_may_be_replaced() {
         refused.stderr
     );
     ended(&mut twins.send(uri, &[&SUMMARY[..], &["--overwrite"]].concat())).with(0);
+    // With --resume, what is right already is not made again.
+    let both = [&SUMMARY[..], &["--overwrite", "--resume"]].concat();
+    let again = ended(&mut twins.send(uri, &both)).with(0);
+    assert!(again.stderr.contains("up to date"), "{}", again.stderr);
     let refused =
         ended(&mut twins.send(uri, &["--preset", "esc26", "--set", "signal.channels=mean"]))
             .with(2);
